@@ -1,0 +1,2 @@
+//! rigd
+fn main() {}
