@@ -1,1 +1,35 @@
-//! gearmodel
+//! Transmission error and backlash of circular and non-circular gear pairs.
+//!
+//! The crate holds the physics and the analysis of measurements: no input or output, no threads of its own, no async.
+//! Angles are in rad, lengths in mm, torque in N·m unless a name says otherwise.
+//!
+//! Conventions, used by every function, log and plot:
+//!
+//! - The centre line lies along +x, the driver at the origin, the driven gear at (a, 0). The driver turns
+//!   counter-clockwise, the driven shaft clockwise, and its angle θ2 counts positive in its own sense of motion, so that
+//!   the transmission function θ2 = f(θ1) increases.
+//! - TE = θ2 measured − f(θ1 measured), positive when the driven gear is ahead.
+//! - [`Direction`] names the driver's sense of rotation and with it the active flank. TE of both senses is counted in the
+//!   same positive sense of θ2, so that backlash = TE_cw − TE_ccw at equal θ1.
+//!
+//! Reading order: [`pitch_curve`] → [`GearPair`] → [`increment`] → [`NominalModel`] (the model); [`measure`] (the
+//! measurement).
+
+mod direction;
+mod errors;
+mod geometry_error;
+pub mod increment;
+pub mod measure;
+mod model;
+mod pair;
+mod pair_file;
+pub mod pitch_curve;
+mod spec;
+
+pub use direction::{Direction, ParseDirectionError};
+pub use errors::Errors;
+pub use geometry_error::GeometryError;
+pub use model::NominalModel;
+pub use pair::{GearPair, MeshPoint};
+pub use pair_file::{PairFile, PairFileError, PairSpec};
+pub use spec::{CircularSpec, EllipticalSpec};

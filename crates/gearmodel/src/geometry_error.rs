@@ -1,0 +1,151 @@
+//! Why a gear pair cannot be made or cannot run.
+
+/// A gear pair that cannot be made, cannot run, or is not described by finite numbers.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GeometryError {
+    /// A number is NaN or infinite.
+    #[error("{quantity} is {value}: a finite number is needed")]
+    NotFinite {
+        /// What was given.
+        quantity: &'static str,
+        /// The value.
+        value: f64,
+    },
+
+    /// A number lies outside what a gear can have.
+    #[error("{quantity} = {value} {unit} is outside {lower} to {upper} {unit}: {advice}")]
+    OutOfRange {
+        /// What was given.
+        quantity: &'static str,
+        /// The value.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// Smallest value accepted.
+        lower: f64,
+        /// Largest value accepted.
+        upper: f64,
+        /// What to do next.
+        advice: &'static str,
+    },
+
+    /// A tooth number outside the limits.
+    #[error("gear {gear} has {teeth} teeth: {lower} to {upper} are accepted")]
+    Teeth {
+        /// 1 = driver, 2 = driven.
+        gear: u8,
+        /// Number of teeth given.
+        teeth: u32,
+        /// Smallest number accepted.
+        lower: u32,
+        /// Largest number accepted.
+        upper: u32,
+    },
+
+    /// The kind of pitch curve needs another tooth number on gear 2.
+    #[error(
+        "a pair of {kind} pitch curves with {teeth1} teeth on gear 1 needs {needed} teeth on gear 2, not {teeth2}: \
+         give both gears teeth in the ratio of their turns"
+    )]
+    TeethRatio {
+        /// Kind of pitch curve.
+        kind: &'static str,
+        /// Teeth of gear 1.
+        teeth1: u32,
+        /// Teeth given for gear 2.
+        teeth2: u32,
+        /// Teeth that gear 2 must have (a whole number, or the pair cannot be cut).
+        needed: f64,
+    },
+
+    /// The driven gear would not turn a whole turn for a whole turn.
+    #[error(
+        "centre distance {centre_distance_mm} mm does not close: the driven gear turns {closure_sum:.6} times a turn of \
+         the driver instead of {closure_needed:.6}; this pitch curve closes at {closing_mm:.6} mm"
+    )]
+    NotClosing {
+        /// Centre distance given, mm.
+        centre_distance_mm: f64,
+        /// Turns of the driven gear a turn of the driver at that distance, (1/2π) ∮ i21 dθ1.
+        closure_sum: f64,
+        /// Turns of the driven gear a turn of the driver that the tooth numbers ask for.
+        closure_needed: f64,
+        /// Centre distance that closes, mm.
+        closing_mm: f64,
+    },
+
+    /// The driver's pitch curve reaches the driven shaft.
+    #[error(
+        "centre distance {centre_distance_mm} mm is not larger than the driver's largest radius {radius_mm:.6} mm at \
+         theta1 = {theta1_rad:.6} rad: no driven pitch curve exists (closure sum infinite); this pitch curve closes at \
+         {closing_mm:.6} mm"
+    )]
+    NoDrivenCurve {
+        /// Centre distance given, mm.
+        centre_distance_mm: f64,
+        /// The driver's largest radius, mm.
+        radius_mm: f64,
+        /// Where it is, rad.
+        theta1_rad: f64,
+        /// Centre distance that closes, mm.
+        closing_mm: f64,
+    },
+
+    /// Flank and centre line stand so that the flank cannot drive.
+    #[error(
+        "effective pressure angle {effective_deg:.3} deg at theta1 = {theta1_rad:.6} rad exceeds {limit_deg} deg: the \
+         flank pushes along the centre line and cannot drive; take a rounder pitch curve or a smaller pressure angle"
+    )]
+    FlankTooSteep {
+        /// Largest |α ± μ|, deg.
+        effective_deg: f64,
+        /// Where it occurs, rad.
+        theta1_rad: f64,
+        /// Largest angle accepted, deg.
+        limit_deg: f64,
+    },
+}
+
+/// Passes a finite `value` in `lower..=upper`.
+pub(crate) fn check_range(
+    quantity: &'static str,
+    value: f64,
+    unit: &'static str,
+    (lower, upper): (f64, f64),
+    advice: &'static str,
+) -> Result<f64, GeometryError> {
+    if !value.is_finite() {
+        return Err(GeometryError::NotFinite { quantity, value });
+    }
+    if value < lower || value > upper {
+        return Err(GeometryError::OutOfRange {
+            quantity,
+            value,
+            unit,
+            lower,
+            upper,
+            advice,
+        });
+    }
+    Ok(value)
+}
+
+/// Fewest teeth that the model accepts: fewer cannot roll on a rack cutter without losing their flanks.
+pub(crate) const MIN_TEETH: u32 = 5;
+/// Most teeth that the model accepts.
+pub(crate) const MAX_TEETH: u32 = 10_000;
+
+/// Passes a tooth number within the limits.
+pub(crate) fn check_teeth(gear: u8, teeth: u32) -> Result<u32, GeometryError> {
+    if (MIN_TEETH..=MAX_TEETH).contains(&teeth) {
+        Ok(teeth)
+    } else {
+        Err(GeometryError::Teeth {
+            gear,
+            teeth,
+            lower: MIN_TEETH,
+            upper: MAX_TEETH,
+        })
+    }
+}

@@ -1,0 +1,41 @@
+//! The measurement: TE over angle from raw samples, its figures, and backlash from both senses.
+
+mod backlash;
+mod figures;
+mod grid;
+mod order;
+mod run_te;
+
+pub use backlash::BacklashCurve;
+pub use figures::{RunFigures, common_zero};
+pub use grid::{AngleGrid, Curve};
+pub use order::Order;
+pub use run_te::{RunConditions, RunTe, TePoint};
+
+/// Why measured curves cannot be combined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeasureError {
+    /// A grid needs a usable number of bins.
+    #[error(
+        "an angle grid of {bins} bins is outside {lower} to {upper} bins a turn: 720 bins of 0.5 deg is the default"
+    )]
+    Bins {
+        /// Bins asked for.
+        bins: usize,
+        /// Fewest accepted.
+        lower: usize,
+        /// Most accepted.
+        upper: usize,
+    },
+    /// Two curves on different grids.
+    #[error(
+        "curves of {ccw} (ccw) and {cw} (cw) bins a turn cannot be subtracted: analyse both on one grid"
+    )]
+    GridMismatch {
+        /// Bins of the ccw curve.
+        ccw: usize,
+        /// Bins of the cw curve.
+        cw: usize,
+    },
+}
