@@ -1,1 +1,22 @@
-//! wire
+//! Codecs of the devices on the rig, without input or output.
+//!
+//! Everything here turns bytes into messages and back and knows nothing of ports, clocks or tasks, so that the
+//! drivers (which ask) and the emulators (which answer) share one implementation, and so that a captured byte
+//! stream is a test.
+//!
+//! | module | device | document |
+//! |---|---|---|
+//! | [`modbus`] | anything that speaks Modbus RTU | Modbus over Serial Line V1.02, Application Protocol V1.1b3 |
+//! | [`register_map`] | registers as data: address, type, word order, scale, unit | |
+//! | [`asda_b2`] | Delta ASDA-B2 servo drive | `docs/wire/asda-b2.md` |
+//! | [`rd60xx`] | Riden RD60xx current source, the brake's driver | `docs/wire/rd60xx.md` |
+//! | [`counter_box`] | the rig's own two-channel counter box | `docs/wire/counter-box.md` |
+
+pub mod asda_b2;
+pub mod counter_box;
+mod hex;
+pub mod modbus;
+pub mod rd60xx;
+pub mod register_map;
+
+pub use hex::Hex;
