@@ -51,13 +51,12 @@ impl Ellipse {
         self.k
     }
 
-    /// Turns of the driven gear a turn of this driver at a centre distance of `distance` (in closing distances):
-    /// (1/2π) ∮ p/(distance (1 − k cos θ) − p) dθ = p/√((distance − p)² − (distance k)²). `None` where the largest
-    /// radius reaches the driven shaft.
-    pub(crate) fn closure_at(&self, distance: f64) -> Option<f64> {
-        let p = 0.5 * (1.0 - self.k * self.k);
-        let gap = distance - p - distance * self.k;
-        (gap > 0.0).then(|| p / (gap * (distance - p + distance * self.k)).sqrt())
+    /// Turns of the driven gear a turn of this driver at a centre distance of `d` closing distances:
+    /// (1/2π) ∮ p/(d (1 − k cos θ) − p) dθ scaled to d = 1, ½ √(1 − k²)/√((d − (1 + k)/2)(d − (1 − k)/2)). `None`
+    /// where the largest radius reaches the driven shaft.
+    pub(crate) fn closure_at(&self, d: f64) -> Option<f64> {
+        let (near, far) = self.radius_range();
+        (d > far).then(|| 0.5 * (1.0 - self.k * self.k).sqrt() / ((d - far) * (d - near)).sqrt())
     }
 }
 
