@@ -40,6 +40,10 @@ pub mod address {
     pub const REGULATION: u16 = 17;
     /// Output switch, 1 on.
     pub const ENABLE: u16 = 18;
+    /// Temperature of the external probe, sign and magnitude, °C.
+    pub const EXTERNAL_TEMPERATURE: u16 = 34;
+    /// Voltage limit of the active preset M0; voltage, current, over-voltage and over-current of M0 to M9 follow.
+    pub const PRESETS: u16 = 80;
     /// Over-voltage trip level of the active preset M0.
     pub const OVER_VOLTAGE: u16 = 82;
     /// Over-current trip level of the active preset M0.
@@ -182,8 +186,10 @@ impl Protection {
 pub struct Map {
     /// The model.
     pub model: Model,
-    /// Inner temperature, °C.
+    /// Temperature of the external probe, °C; the probe sits on the brake's housing.
     pub temperature: RegisterDef,
+    /// Temperature inside the device, °C.
+    pub internal_temperature: RegisterDef,
     /// Voltage limit, V.
     pub voltage_set: RegisterDef,
     /// Current limit, A.
@@ -209,10 +215,10 @@ pub struct Map {
 }
 
 impl Map {
-    /// First register of the block from temperature to output switch, which one request reads.
+    /// First register of the block from the inner temperature to the external probe, which one request reads.
     pub const BLOCK_ADDRESS: u16 = address::TEMPERATURE;
     /// Registers of that block.
-    pub const BLOCK_LEN: u16 = address::ENABLE - address::TEMPERATURE + 1;
+    pub const BLOCK_LEN: u16 = address::EXTERNAL_TEMPERATURE + 2 - address::TEMPERATURE;
 
     /// Registers of `model`.
     pub fn new(model: Model) -> Self {
@@ -222,6 +228,16 @@ impl Map {
         let (max_v, max_a) = (model.max_voltage_v(), model.max_current_a());
         let reading = |name, address, scale, unit| {
             RegisterDef::new(name, address, RegisterKind::U16, scale, unit, Access::Read)
+        };
+        let degrees = |name, address| {
+            RegisterDef::new(
+                name,
+                address,
+                RegisterKind::SignMagnitude,
+                1.0,
+                "degC",
+                Access::Read,
+            )
         };
         let setting = |name, address, scale, unit, max: f64| {
             RegisterDef::new(
@@ -236,14 +252,8 @@ impl Map {
         };
         Self {
             model,
-            temperature: RegisterDef::new(
-                "temperature",
-                address::TEMPERATURE,
-                RegisterKind::SignMagnitude,
-                1.0,
-                "degC",
-                Access::Read,
-            ),
+            temperature: degrees("brake temperature", address::EXTERNAL_TEMPERATURE),
+            internal_temperature: degrees("device temperature", address::TEMPERATURE),
             voltage_set: setting("voltage limit", address::VOLTAGE_SET, volts, "V", max_v),
             current_set: setting("current limit", address::CURRENT_SET, amps, "A", max_a),
             voltage_out: reading("output voltage", address::VOLTAGE_OUT, volts, "V"),
@@ -317,10 +327,11 @@ mod tests {
     }
 
     #[test]
-    fn one_block_covers_temperature_to_switch() {
+    fn one_block_covers_all_that_is_supervised() {
         let map = Map::new(Model::Rd6006);
         let mut block = vec![0; usize::from(Map::BLOCK_LEN)];
         block[usize::from(address::ENABLE - Map::BLOCK_ADDRESS)] = 1;
+        block[usize::from(address::EXTERNAL_TEMPERATURE + 1 - Map::BLOCK_ADDRESS)] = 41;
         block[usize::from(address::CURRENT_OUT - Map::BLOCK_ADDRESS)] = 500;
         assert_eq!(
             map.enable.decode_from(Map::BLOCK_ADDRESS, &block).unwrap(),
@@ -331,6 +342,12 @@ mod tests {
                 .decode_from(Map::BLOCK_ADDRESS, &block)
                 .unwrap(),
             0.5
+        );
+        assert_eq!(
+            map.temperature
+                .decode_from(Map::BLOCK_ADDRESS, &block)
+                .unwrap(),
+            41.0
         );
     }
 }
