@@ -1,0 +1,53 @@
+//! The simulated rig's mechanics in the time domain: the truth against which measurement and diagnosis are checked.
+//!
+//! Servo with reduction, input shaft, two gears with backlash in exact tooth contact, output shaft, powder brake, two encoders.
+//! It shares no formula with the gear model: contact of the flanks is solved exactly ([`Flank`], displaced rack-generated teeth),
+//! encoder discs and couplings read what their geometry says, and loads wind up real springs.
+//!
+//! | part | file |
+//! |---|---|
+//! | pitch curves, tooth contact, its table over the angle, elastic mesh | `geometry`, `flank`, `table`, `mesh` |
+//! | five inertias and the integrator | `chain` |
+//! | servo drive | `servo` |
+//! | powder brake, its hysteresis, its stick-slip | `brake`, `hysteresis`, `stick_slip` |
+//! | encoders, counters, skew between them | `encoder`, `skew` |
+//! | bearings' run-out, slipping clamp, lost counts | `run_out`, `slippage` |
+//! | effects that the nominal model does not know | [`undocumented`] |
+//!
+//! Same specification, seed and sequence of calls give the same samples, bit for bit.
+
+mod brake;
+mod chain;
+mod encoder;
+mod error;
+mod flank;
+mod geometry;
+mod hysteresis;
+mod mesh;
+mod rig;
+mod run_out;
+mod servo;
+mod skew;
+mod slippage;
+mod spec;
+mod stick_slip;
+mod table;
+#[cfg(test)]
+mod tests;
+pub mod undocumented;
+
+pub use brake::{BrakeCurvePoint, BrakeSpec, STICK_SLIP_LIMIT_RPM};
+pub use encoder::{CountLossSpec, EncoderSpec, EncodersSpec};
+pub use error::PlantError;
+pub use flank::Flank;
+pub use geometry::GearSpec;
+pub use mesh::{DEFAULT_MESH_COMPLIANCE_MM2_RAD_PER_NM, HousingSpec, MeshSpec};
+pub use rig::{Plant, Sample, Truth};
+pub use run_out::NoiseSpec;
+pub use servo::DriveSpec;
+pub use slippage::ClampSpec;
+pub use spec::{
+    DEFAULT_SHAFT_COMPLIANCE_INPUT_RAD_PER_NM, DEFAULT_SHAFT_COMPLIANCE_OUTPUT_RAD_PER_NM,
+    PlantSpec, ShaftSpec,
+};
+pub use undocumented::UNDOCUMENTED;
