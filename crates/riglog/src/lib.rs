@@ -1,1 +1,36 @@
-//! riglog
+//! The rig log: what a gear rig records, as an MCAP file that every MCAP tool can open.
+//!
+//! - [`LogWriter`] writes a log so that a killed process, a full disk or a power cut leaves a clean prefix of it.
+//! - [`LogReader`] reads any log in file order, whole or cut off, a chunk at a time, and says whether it is whole.
+//! - [`recover()`] finalises what a killed writer left.
+//! - [`info()`] says what is in a log; [`RunStream`] and [`read_runs`] give its runs as shaft angles.
+//!
+//! Channels, metadata and units are those of `docs` and of `proto/rig.proto`; times are ns since the Unix epoch.
+
+mod batch;
+mod completeness;
+mod container;
+mod error;
+mod info;
+mod metadata;
+pub mod proto;
+mod reader;
+mod recover;
+mod run_stream;
+mod runs;
+mod survey;
+mod topic;
+mod walk;
+mod write;
+
+pub use batch::BatchBuilder;
+pub use completeness::{Completeness, Defect};
+pub use error::{BatchError, LogError};
+pub use info::{AttachmentInfo, ChannelInfo, LogInfo, RunInfo, info};
+pub use metadata::{AngleScale, EncoderMetadata, MetadataMap, RunMetadata};
+pub use reader::{LogReader, Record};
+pub use recover::{Recovery, recover, recover_directory};
+pub use run_stream::{RunStream, RunVisitor, SampleBlock, StreamTotals};
+pub use runs::{RecordedRun, RunSpan, RunTotals, read_runs};
+pub use topic::Topic;
+pub use write::{LogStatistics, LogWriter, WriterOptions};

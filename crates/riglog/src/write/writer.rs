@@ -1,0 +1,487 @@
+//! The writer of a rig log.
+
+use std::{
+    fs::{File, OpenOptions, TryLockError},
+    io,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use prost::Message;
+
+use super::{
+    store::{Store, Tail},
+    sync::Syncer,
+};
+use crate::{
+    container::{
+        bytes::Put,
+        chunk::{ChunkBuilder, ChunkCompressor},
+        head::encode_head,
+        op,
+        summary::{AttachmentIndex, MetadataIndex, Summary},
+    },
+    error::LogError,
+    metadata::{EncoderMetadata, MetadataMap, RunMetadata, SEALED, SEALED_KEY},
+    proto::{AngleBatch, Backlash, Level, RigState, Timestamp, TransmissionError, foxglove},
+    topic::Topic,
+};
+
+/// The largest message, text or file that is accepted: far above any that a rig has, far below what readers refuse.
+const MAX_CONTENT_BYTES: usize = 64 << 20;
+
+/// How a log is written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WriterOptions {
+    /// Program and version, as `rigd 0.1.0`.
+    pub library: String,
+    /// A chunk is closed when this much log time or this much wall time has passed since its first message.
+    pub chunk_period_ms: u32,
+    /// A chunk is closed at this size, before compression.
+    pub chunk_bytes: usize,
+    /// Data is synced to the disk at least this often.
+    pub sync_period_ms: u32,
+    /// Level of zstd; see [`WriterOptions::new`] for the default.
+    pub compression_level: i32,
+}
+
+impl WriterOptions {
+    /// The project's policy: chunks of 100 ms or 1 MiB, synced every second.
+    ///
+    /// Level 1 is zstd's fastest that still packs the deltas of angles entropy-coded.
+    pub fn new(library: impl Into<String>) -> Self {
+        Self {
+            library: library.into(),
+            chunk_period_ms: 100,
+            chunk_bytes: 1 << 20,
+            sync_period_ms: 1000,
+            compression_level: 1,
+        }
+    }
+}
+
+/// What a finished log holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LogStatistics {
+    /// The file.
+    pub path: PathBuf,
+    /// Messages on all channels.
+    pub messages: u64,
+    /// Angle samples.
+    pub samples: u64,
+    /// Chunks.
+    pub chunks: u64,
+    /// Size of the file.
+    pub bytes: u64,
+}
+
+/// Writes one log.
+///
+/// Every chunk reaches the operating system in one call and as whole records, so a process killed at any
+/// instant leaves a file that is a clean prefix; [`crate::recover()`] finalises it. The file is locked for as long
+/// as it is written. A writer that is dropped without [`LogWriter::finish`] hands over what it has and leaves the
+/// file without an end, because nobody vouched for it.
+pub struct LogWriter {
+    path: PathBuf,
+    options: WriterOptions,
+    tail: Tail,
+    codec: ChunkCompressor,
+    chunk: ChunkBuilder,
+    /// When the chunk under way got its first message.
+    chunk_since: Instant,
+    sequences: [u32; Topic::ALL.len()],
+    summary: Summary,
+    samples: u64,
+    syncer: Syncer,
+    synced_at: Instant,
+    dirty: bool,
+    failure: Option<Failure>,
+}
+
+/// A failed write, kept for another try at the end.
+struct Failure {
+    source: io::Error,
+    records: Vec<u8>,
+    summary: Summary,
+}
+
+impl LogWriter {
+    /// Creates the file, locks it, and hands header, schemas and channels to the operating system.
+    ///
+    /// # Errors
+    /// The file exists, another process holds it, or the operating system refuses.
+    pub fn create(path: impl AsRef<Path>, options: WriterOptions) -> Result<Self, LogError> {
+        let path = path.as_ref();
+        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|source| {
+            if source.kind() == io::ErrorKind::AlreadyExists {
+                LogError::Exists { path: path.to_owned() }
+            } else {
+                LogError::io("create", path)(source)
+            }
+        })?;
+        lock(&file, path)?;
+        let for_sync = file.try_clone().map_err(LogError::io("open", path))?;
+        sync_directory_of(path);
+        Self::on(path, Box::new(file), move || for_sync.sync_data(), options)
+    }
+
+    fn on(
+        path: &Path,
+        store: Box<dyn Store>,
+        sync: impl FnMut() -> io::Result<()> + Send + 'static,
+        options: WriterOptions,
+    ) -> Result<Self, LogError> {
+        let mut summary = Summary::default();
+        let head = encode_head(&options.library, &mut summary);
+        let now = Instant::now();
+        let mut writer = Self {
+            path: path.to_owned(),
+            tail: Tail::new(store),
+            codec: ChunkCompressor::new(options.compression_level)
+                .map_err(|source| LogError::Compress { path: path.to_owned(), bytes: 0, source })?,
+            chunk: ChunkBuilder::default(),
+            chunk_since: now,
+            sequences: [0; Topic::ALL.len()],
+            summary: Summary::default(),
+            samples: 0,
+            syncer: Syncer::new(sync).map_err(LogError::io("start a thread to sync", path))?,
+            synced_at: now,
+            dirty: false,
+            failure: None,
+            options,
+        };
+        writer.hand_over(head, summary)?;
+        writer.syncer.request();
+        Ok(writer)
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Bytes handed to the operating system so far.
+    pub fn bytes(&self) -> u64 {
+        self.tail.at_byte()
+    }
+
+    /// Adds a batch of angles.
+    ///
+    /// # Errors
+    /// A batch that contradicts itself; or the operating system refused a chunk that this message closed.
+    pub fn angles(&mut self, log_time_ns: u64, publish_time_ns: u64, batch: &AngleBatch) -> Result<(), LogError> {
+        batch.validate()?;
+        self.message(Topic::Angles, log_time_ns, publish_time_ns, batch)?;
+        self.samples += batch.len() as u64;
+        Ok(())
+    }
+
+    /// Adds a state of the drives.
+    ///
+    /// # Errors
+    /// The operating system refused a chunk that this message closed.
+    pub fn state(&mut self, log_time_ns: u64, publish_time_ns: u64, state: &RigState) -> Result<(), LogError> {
+        self.message(Topic::State, log_time_ns, publish_time_ns, state)
+    }
+
+    /// Adds a transmission error.
+    ///
+    /// # Errors
+    /// As [`LogWriter::state`].
+    pub fn te(&mut self, log_time_ns: u64, publish_time_ns: u64, te: &TransmissionError) -> Result<(), LogError> {
+        self.message(Topic::Te, log_time_ns, publish_time_ns, te)
+    }
+
+    /// Adds a backlash.
+    ///
+    /// # Errors
+    /// As [`LogWriter::state`].
+    pub fn backlash(&mut self, log_time_ns: u64, publish_time_ns: u64, backlash: &Backlash) -> Result<(), LogError> {
+        self.message(Topic::Backlash, log_time_ns, publish_time_ns, backlash)
+    }
+
+    /// Adds a line of text from the part of the rig or program called `name`.
+    ///
+    /// # Errors
+    /// As [`LogWriter::state`].
+    pub fn event(
+        &mut self,
+        log_time_ns: u64,
+        publish_time_ns: u64,
+        level: Level,
+        name: &str,
+        message: &str,
+    ) -> Result<(), LogError> {
+        let line = foxglove::Log {
+            timestamp: Some(Timestamp::from_ns(publish_time_ns)),
+            level: level.into(),
+            message: message.to_owned(),
+            name: name.to_owned(),
+            ..Default::default()
+        };
+        self.message(Topic::Events, log_time_ns, publish_time_ns, &line)
+    }
+
+    /// Adds the metadata record `rig.run`.
+    ///
+    /// # Errors
+    /// The operating system refused.
+    pub fn run_metadata(&mut self, run: &RunMetadata) -> Result<(), LogError> {
+        self.metadata(RunMetadata::NAME, &run.to_map())
+    }
+
+    /// Adds the metadata record `rig.encoders`, after homing.
+    ///
+    /// # Errors
+    /// As [`LogWriter::run_metadata`].
+    pub fn encoders(&mut self, encoders: &EncoderMetadata) -> Result<(), LogError> {
+        self.metadata(EncoderMetadata::NAME, &encoders.to_map())
+    }
+
+    /// Adds the metadata record `rig.sealed`: a salted hash of a label that is withheld.
+    ///
+    /// # Errors
+    /// As [`LogWriter::run_metadata`].
+    pub fn sealed(&mut self, hash: &str) -> Result<(), LogError> {
+        self.metadata(SEALED, &MetadataMap::from([(SEALED_KEY.to_owned(), hash.to_owned())]))
+    }
+
+    /// Attaches a file.
+    ///
+    /// # Errors
+    /// The content is larger than 64 MiB, or the operating system refused.
+    pub fn attach(&mut self, log_time_ns: u64, name: &str, media_type: &str, data: &[u8]) -> Result<(), LogError> {
+        self.check_size("an attachment", name.len() + media_type.len() + data.len())?;
+        self.begin_lone_record()?;
+        let mut record = Vec::with_capacity(data.len() + 256);
+        record.put_record(op::ATTACHMENT, |out| {
+            let content_at = out.len();
+            out.put_u64(log_time_ns);
+            out.put_u64(log_time_ns);
+            out.put_str(name);
+            out.put_str(media_type);
+            out.put_u64(data.len() as u64);
+            out.extend_from_slice(data);
+            let crc = crc32fast::hash(&out[content_at..]);
+            out.put_u32(crc);
+        });
+        let index = AttachmentIndex {
+            offset: self.tail.at_byte(),
+            length: record.len() as u64,
+            log_time_ns,
+            create_time_ns: log_time_ns,
+            data_size: data.len() as u64,
+            name: name.to_owned(),
+            media_type: media_type.to_owned(),
+        };
+        self.hand_over(record, Summary { attachments: vec![index], ..Default::default() })
+    }
+
+    /// Closes a chunk that is due by wall time and syncs what is due; to be called when idle, a few times in a
+    /// chunk period.
+    ///
+    /// # Errors
+    /// The operating system refused a chunk or a sync.
+    pub fn tick(&mut self) -> Result<(), LogError> {
+        self.check_open()?;
+        let due = Duration::from_millis(self.options.chunk_period_ms.into());
+        if !self.chunk.is_empty() && self.chunk_since.elapsed() >= due {
+            self.close_chunk()?;
+        }
+        self.sync_if_due()
+    }
+
+    /// Ends the log: last chunk, summary, sync to disk.
+    ///
+    /// After a failed write this tries once more to write what is left; where that fails again, it ends the log
+    /// without, so that what is there stays readable.
+    ///
+    /// # Errors
+    /// Messages were lost, or the end could not be written or synced.
+    pub fn finish(mut self) -> Result<LogStatistics, LogError> {
+        if self.failure.is_none() && !self.chunk.is_empty() {
+            // The failure is noted, and told below together with what became of the file.
+            let _ = self.close_chunk();
+        }
+        let lost = self.failure.take().and_then(|failure| self.retry(failure));
+        let end = self.summary.encode_end(self.tail.at_byte(), self.tail.crc());
+        let (path, at_byte) = (self.path.clone(), self.tail.at_byte());
+        let ended = self.tail.append(&end);
+        self.syncer.request();
+        let not_synced = self.syncer.finish();
+        if let Some(Failure { source, records, summary }) = lost {
+            return Err(LogError::Incomplete {
+                path,
+                lost_messages: summary.messages(),
+                at_byte,
+                wanted_bytes: records.len() as u64,
+                finalised: ended.is_ok(),
+                source,
+            });
+        }
+        let wanted_bytes = end.len() as u64;
+        ended.map_err(|source| LogError::Write { path, at_byte, wanted_bytes, source })?;
+        if let Some(source) = not_synced {
+            return Err(LogError::io("sync", &self.path)(source));
+        }
+        Ok(LogStatistics {
+            path: self.path.clone(),
+            messages: self.summary.messages(),
+            samples: self.samples,
+            chunks: self.summary.chunks.len() as u64,
+            bytes: self.tail.at_byte(),
+        })
+    }
+
+    fn message(
+        &mut self,
+        topic: Topic,
+        log_time_ns: u64,
+        publish_time_ns: u64,
+        message: &impl Message,
+    ) -> Result<(), LogError> {
+        self.check_open()?;
+        self.check_size("a message", message.encoded_len())?;
+        let period_ns = u64::from(self.options.chunk_period_ms) * 1_000_000;
+        // The message that would make a chunk longer than its period opens the next one.
+        if !self.chunk.is_empty()
+            && log_time_ns.saturating_sub(self.chunk.first_log_time_ns()) >= period_ns
+        {
+            self.close_chunk()?;
+        }
+        if self.chunk.is_empty() {
+            self.chunk_since = Instant::now();
+        }
+        let sequence = &mut self.sequences[topic as usize];
+        self.chunk.add(topic.id(), *sequence, log_time_ns, publish_time_ns, |out| message.encode_raw(out));
+        *sequence = sequence.wrapping_add(1);
+        let due = Duration::from_millis(self.options.chunk_period_ms.into());
+        if self.chunk.bytes() >= self.options.chunk_bytes || self.chunk_since.elapsed() >= due {
+            self.close_chunk()?;
+        }
+        self.sync_if_due()
+    }
+
+    fn metadata(&mut self, name: &'static str, map: &MetadataMap) -> Result<(), LogError> {
+        self.check_size("a metadata record", map.iter().map(|(key, value)| key.len() + value.len()).sum())?;
+        self.begin_lone_record()?;
+        let mut record = Vec::new();
+        record.put_record(op::METADATA, |out| {
+            out.put_str(name);
+            out.put_map(map);
+        });
+        let (offset, length) = (self.tail.at_byte(), record.len() as u64);
+        let index = MetadataIndex { offset, length, name: name.to_owned() };
+        self.hand_over(record, Summary { metadata: vec![index], ..Default::default() })
+    }
+
+    fn check_open(&self) -> Result<(), LogError> {
+        match self.failure {
+            None => Ok(()),
+            Some(_) => Err(LogError::Stopped { path: self.path.clone(), at_byte: self.tail.at_byte() }),
+        }
+    }
+
+    fn check_size(&self, what: &'static str, bytes: usize) -> Result<(), LogError> {
+        if bytes <= MAX_CONTENT_BYTES {
+            return Ok(());
+        }
+        Err(LogError::TooLarge { path: self.path.clone(), what, bytes, limit: MAX_CONTENT_BYTES as u64 })
+    }
+
+    /// Records outside of chunks follow the messages that were given before them.
+    fn begin_lone_record(&mut self) -> Result<(), LogError> {
+        self.check_open()?;
+        if self.chunk.is_empty() { Ok(()) } else { self.close_chunk() }
+    }
+
+    /// Compresses the chunk under way and hands it over with its indexes.
+    fn close_chunk(&mut self) -> Result<(), LogError> {
+        let mut records = Vec::new();
+        let index = self.chunk.encode(&mut self.codec, self.tail.at_byte(), &mut records).map_err(|source| {
+            LogError::Compress { path: self.path.clone(), bytes: self.chunk.bytes(), source }
+        })?;
+        let mut summary = Summary { chunks: vec![index], ..Default::default() };
+        summary.widen(self.chunk.bounds_ns());
+        self.chunk.counts().for_each(|(channel, messages)| summary.add_message_count(channel, messages));
+        self.chunk.clear();
+        self.hand_over(records, summary)
+    }
+
+    /// Hands whole records to the operating system; `summary` tells what they hold.
+    fn hand_over(&mut self, records: Vec<u8>, summary: Summary) -> Result<(), LogError> {
+        match self.tail.append(&records) {
+            Ok(()) => {
+                self.summary.append(summary);
+                self.dirty = true;
+                Ok(())
+            }
+            Err(source) => {
+                let error = LogError::Write {
+                    path: self.path.clone(),
+                    at_byte: self.tail.at_byte(),
+                    wanted_bytes: records.len() as u64,
+                    source: copy_of(&source),
+                };
+                self.failure = Some(Failure { source, records, summary });
+                Err(error)
+            }
+        }
+    }
+
+    /// Tries once more what could not be written; returns what still cannot.
+    fn retry(&mut self, failure: Failure) -> Option<Failure> {
+        let Failure { records, summary, .. } = failure;
+        match self.tail.append(&records) {
+            Ok(()) => {
+                self.summary.append(summary);
+                None
+            }
+            Err(source) => Some(Failure { source, records, summary }),
+        }
+    }
+
+    fn sync_if_due(&mut self) -> Result<(), LogError> {
+        if let Some(source) = self.syncer.error() {
+            return Err(LogError::io("sync", &self.path)(source));
+        }
+        let period = Duration::from_millis(self.options.sync_period_ms.into());
+        if self.dirty && self.synced_at.elapsed() >= period {
+            self.syncer.request();
+            (self.dirty, self.synced_at) = (false, Instant::now());
+        }
+        Ok(())
+    }
+}
+
+impl Drop for LogWriter {
+    fn drop(&mut self) {
+        if !self.chunk.is_empty() && self.failure.is_none() {
+            // Nobody is left to tell; the next start finds the file without an end.
+            let _ = self.close_chunk();
+            self.syncer.request();
+        }
+    }
+}
+
+/// The same error once more: one for the caller, one for the end of the log.
+fn copy_of(error: &io::Error) -> io::Error {
+    error.raw_os_error().map_or_else(|| error.kind().into(), io::Error::from_raw_os_error)
+}
+
+/// Makes the new file's name survive a power cut. Where a file system does not sync directories, nothing is lost
+/// but that.
+fn sync_directory_of(path: &Path) {
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    if let Ok(directory) = File::open(parent.unwrap_or(Path::new("."))) {
+        let _ = directory.sync_all();
+    }
+}
+
+fn lock(file: &File, path: &Path) -> Result<(), LogError> {
+    match file.try_lock() {
+        Ok(()) => Ok(()),
+        Err(TryLockError::WouldBlock) => Err(LogError::Locked { path: path.to_owned() }),
+        Err(TryLockError::Error(source)) => Err(LogError::io("lock", path)(source)),
+    }
+}
