@@ -40,6 +40,8 @@ pub mod address {
     pub const REGULATION: u16 = 17;
     /// Output switch, 1 on.
     pub const ENABLE: u16 = 18;
+    /// Writing n loads preset Mn.
+    pub const PRESET_SELECT: u16 = 19;
     /// Temperature of the external probe, sign and magnitude, °C.
     pub const EXTERNAL_TEMPERATURE: u16 = 34;
     /// Voltage limit of the active preset M0; voltage, current, over-voltage and over-current of M0 to M9 follow.
