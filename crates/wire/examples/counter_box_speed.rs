@@ -14,10 +14,9 @@ const ROUNDS: usize = 15;
 const GOAL_PER_S: f64 = 30e6;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    for (title, spread) in [
-        ("10 kS/s, 5 rpm, 3.6 M counts/rev: one byte a delta", 5),
-        ("fast: two bytes a delta", 4000),
-    ] {
+    for (title, spread) in
+        [("10 kS/s, 5 rpm, 3.6 M counts/rev: one byte a delta", 5), ("fast: two bytes a delta", 4000)]
+    {
         let batches = batches(spread);
         let samples = (BATCH * BATCHES) as f64;
         let mut encoder = Encoder::new();
@@ -39,24 +38,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 decoder.feed(piece, &mut frames);
             }
         });
-        let same = frames
-            .iter()
-            .zip(&batches)
-            .all(|(frame, batch)| matches!(frame, Frame::Samples(found) if found == batch));
+        let same =
+            frames.iter().zip(&batches).all(|(frame, batch)| matches!(frame, Frame::Samples(found) if found == batch));
         if frames.len() != batches.len() || !same {
             return Err("the decoded batches differ from the encoded ones".into());
         }
-        println!(
-            "{title}: {:.2} bytes a sample",
-            stream.len() as f64 / samples
-        );
+        println!("{title}: {:.2} bytes a sample", stream.len() as f64 / samples);
         for (way, seconds) in [("encode", encode_s), ("decode", decode_s)] {
             let rate = samples / seconds;
-            println!(
-                "  {way} {:6.1} M samples/s, {:.1} times the goal",
-                rate / 1e6,
-                rate / GOAL_PER_S
-            );
+            println!("  {way} {:6.1} M samples/s, {:.1} times the goal", rate / 1e6, rate / GOAL_PER_S);
         }
     }
     Ok(())
@@ -81,11 +71,7 @@ fn batches(spread: i32) -> Vec<Samples> {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         30 + (state >> 16) as i32 % spread
     };
-    let mut column = || {
-        (0..BATCH)
-            .map(|n| if n == 0 { 0 } else { delta() })
-            .collect::<Vec<i32>>()
-    };
+    let mut column = || (0..BATCH).map(|n| if n == 0 { 0 } else { delta() }).collect::<Vec<i32>>();
     (0..BATCHES)
         .map(|n| Samples {
             sequence: n as u32,

@@ -13,11 +13,7 @@ pub const fn address(group: u8, index: u8) -> u16 {
 
 /// Parameter number (group, index) of an address, and whether it is the high word.
 pub const fn parameter(address: u16) -> (u8, u8, bool) {
-    (
-        (address >> 8) as u8,
-        ((address & 0xFF) / 2) as u8,
-        address & 1 == 1,
-    )
+    ((address >> 8) as u8, ((address & 0xFF) / 2) as u8, address & 1 == 1)
 }
 
 /// Registers one request may read or write (2010, p. 8-10; 2013, p. 8-11).
@@ -28,14 +24,7 @@ pub const FRAME_SILENCE_MS: u64 = 10;
 pub const RAMP_SPEED_RPM: f64 = 3000.0;
 
 const fn hex16(name: &'static str, group: u8, index: u8, access: Access) -> RegisterDef {
-    RegisterDef::new(
-        name,
-        address(group, index),
-        RegisterKind::U16,
-        1.0,
-        "",
-        access,
-    )
+    RegisterDef::new(name, address(group, index), RegisterKind::U16, 1.0, "", access)
 }
 
 const fn i32_def(
@@ -46,31 +35,11 @@ const fn i32_def(
     unit: &'static str,
     access: Access,
 ) -> RegisterDef {
-    RegisterDef::new(
-        name,
-        address(group, index),
-        RegisterKind::I32LowFirst,
-        scale,
-        unit,
-        access,
-    )
+    RegisterDef::new(name, address(group, index), RegisterKind::I32LowFirst, scale, unit, access)
 }
 
-const fn u16_def(
-    name: &'static str,
-    group: u8,
-    index: u8,
-    scale: f64,
-    unit: &'static str,
-) -> RegisterDef {
-    RegisterDef::new(
-        name,
-        address(group, index),
-        RegisterKind::U16,
-        scale,
-        unit,
-        Access::ReadWrite,
-    )
+const fn u16_def(name: &'static str, group: u8, index: u8, scale: f64, unit: &'static str) -> RegisterDef {
+    RegisterDef::new(name, address(group, index), RegisterKind::U16, scale, unit, Access::ReadWrite)
 }
 
 /// P0-00 VER: firmware version, as the panel shows it without its point.
@@ -96,17 +65,13 @@ pub const STATUS_MONITOR_CODE: RegisterDef = u16_def("P0-45 PCMNA", 0, 45, 1.0, 
 /// P0-46 SVSTS: state of the output functions, [`Outputs`].
 pub const OUTPUTS: RegisterDef = hex16("P0-46 SVSTS", 0, 46, Access::Read);
 /// P1-01 CTL: control mode, [`MODE_SPEED`] for speed control; takes effect at the next power-up.
-pub const CONTROL_MODE: RegisterDef =
-    hex16("P1-01 CTL", 1, 1, Access::ReadWrite).limited(0, 0x1110);
+pub const CONTROL_MODE: RegisterDef = hex16("P1-01 CTL", 1, 1, Access::ReadWrite).limited(0, 0x1110);
 /// P1-09 SP1: internal speed command 1, motor rpm (2013, p. 6-13).
-pub const SPEED_1: RegisterDef =
-    i32_def("P1-09 SP1", 1, 9, 0.1, "rpm", Access::ReadWrite).limited(-50_000, 50_000);
+pub const SPEED_1: RegisterDef = i32_def("P1-09 SP1", 1, 9, 0.1, "rpm", Access::ReadWrite).limited(-50_000, 50_000);
 /// P1-10 SP2: internal speed command 2, motor rpm (2013, p. 6-13).
-pub const SPEED_2: RegisterDef =
-    i32_def("P1-10 SP2", 1, 10, 0.1, "rpm", Access::ReadWrite).limited(-50_000, 50_000);
+pub const SPEED_2: RegisterDef = i32_def("P1-10 SP2", 1, 10, 0.1, "rpm", Access::ReadWrite).limited(-50_000, 50_000);
 /// P1-11 SP3: internal speed command 3, motor rpm (2013, p. 6-13).
-pub const SPEED_3: RegisterDef =
-    i32_def("P1-11 SP3", 1, 11, 0.1, "rpm", Access::ReadWrite).limited(-50_000, 50_000);
+pub const SPEED_3: RegisterDef = i32_def("P1-11 SP3", 1, 11, 0.1, "rpm", Access::ReadWrite).limited(-50_000, 50_000);
 /// P1-34 TACC: time from 0 to [`RAMP_SPEED_RPM`].
 pub const RAMP_UP: RegisterDef = u16_def("P1-34 TACC", 1, 34, 1.0, "ms").limited(1, 20_000);
 /// P1-35 TDEC: time from [`RAMP_SPEED_RPM`] to 0.
@@ -132,15 +97,8 @@ pub const INPUT_FUNCTIONS: [RegisterDef; 9] = [
     hex16("P2-36 DI9", 2, 36, Access::ReadWrite).limited(0, 0x15F),
 ];
 /// P2-30 INH: auxiliary functions; [`AUX_RAM_ONLY`] keeps writes out of the EEPROM. Itself never stored.
-pub const AUXILIARY: RegisterDef = RegisterDef::new(
-    "P2-30 INH",
-    address(2, 30),
-    RegisterKind::I16,
-    1.0,
-    "",
-    Access::ReadWrite,
-)
-.limited(-8, 8);
+pub const AUXILIARY: RegisterDef =
+    RegisterDef::new("P2-30 INH", address(2, 30), RegisterKind::I16, 1.0, "", Access::ReadWrite).limited(-8, 8);
 /// P3-00 ADR: unit number.
 pub const UNIT: RegisterDef = hex16("P3-00 ADR", 3, 0, Access::ReadWrite).limited(1, 0x7F);
 /// P3-01 BRT: baud rate code, one hexadecimal digit a port.
@@ -152,8 +110,7 @@ pub const FAULT_ACTION: RegisterDef = hex16("P3-03 FLT", 3, 3, Access::ReadWrite
 /// P3-04 CWD: communication watchdog; 0 (the default) is off.
 pub const WATCHDOG: RegisterDef = u16_def("P3-04 CWD", 3, 4, 1.0, "s").limited(0, 20);
 /// P3-05 CMM: which ports may write.
-pub const COMMUNICATION_MODE: RegisterDef =
-    hex16("P3-05 CMM", 3, 5, Access::ReadWrite).limited(0, 1);
+pub const COMMUNICATION_MODE: RegisterDef = hex16("P3-05 CMM", 3, 5, Access::ReadWrite).limited(0, 1);
 /// P3-06 SDI: a bit an input; set means that software (P4-07) drives it instead of the terminal (2018, p. 7-88).
 pub const INPUT_SOURCE: RegisterDef = hex16("P3-06 SDI", 3, 6, Access::ReadWrite).limited(0, 0x1FF);
 /// P3-07 CDT: extra delay before an answer.
@@ -302,9 +259,7 @@ impl Alarm {
             0x0015 => "forward limit",
             0x0016 => "power stage too hot",
             0x0019 => "serial communication error",
-            ALARM_COMMUNICATION_TIMEOUT => {
-                "serial communication timed out: the drive's watchdog P3-04 elapsed"
-            }
+            ALARM_COMMUNICATION_TIMEOUT => "serial communication timed out: the drive's watchdog P3-04 elapsed",
             0x0022 => "a phase of the main supply is missing",
             _ => "see the alarm list of the manual",
         }
@@ -353,10 +308,7 @@ mod tests {
     #[test]
     fn input_functions_round_trip() {
         for code in 0..=0xFF {
-            assert_eq!(
-                InputFunction::from_parameter(0x100 | code).code(),
-                code as u8
-            );
+            assert_eq!(InputFunction::from_parameter(0x100 | code).code(), code as u8);
         }
         assert_eq!(InputFunction::ServoOn.parameter(true), 0x101);
         assert!(is_normally_open(0x101) && !is_normally_open(0x21));
@@ -364,10 +316,6 @@ mod tests {
 
     #[test]
     fn alarms_read_as_on_the_panel() {
-        assert!(
-            Alarm(0x20)
-                .to_string()
-                .starts_with("AL020: serial communication timed out")
-        );
+        assert!(Alarm(0x20).to_string().starts_with("AL020: serial communication timed out"));
     }
 }

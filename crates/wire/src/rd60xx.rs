@@ -228,29 +228,13 @@ impl Map {
         let raw_max = |value: f64, step: f64| (value / step).round() as i64;
         // The trip levels may stand a little above the ranges (the keypad offers 62 V and 6.2 A on the RD6006).
         let (max_v, max_a) = (model.max_voltage_v(), model.max_current_a());
-        let reading = |name, address, scale, unit| {
-            RegisterDef::new(name, address, RegisterKind::U16, scale, unit, Access::Read)
-        };
-        let degrees = |name, address| {
-            RegisterDef::new(
-                name,
-                address,
-                RegisterKind::SignMagnitude,
-                1.0,
-                "degC",
-                Access::Read,
-            )
-        };
+        let reading =
+            |name, address, scale, unit| RegisterDef::new(name, address, RegisterKind::U16, scale, unit, Access::Read);
+        let degrees =
+            |name, address| RegisterDef::new(name, address, RegisterKind::SignMagnitude, 1.0, "degC", Access::Read);
         let setting = |name, address, scale, unit, max: f64| {
-            RegisterDef::new(
-                name,
-                address,
-                RegisterKind::U16,
-                scale,
-                unit,
-                Access::ReadWrite,
-            )
-            .limited(0, raw_max(max, scale))
+            RegisterDef::new(name, address, RegisterKind::U16, scale, unit, Access::ReadWrite)
+                .limited(0, raw_max(max, scale))
         };
         Self {
             model,
@@ -272,20 +256,8 @@ impl Map {
             protection: reading("protection", address::PROTECTION, 1.0, ""),
             regulation: reading("regulation", address::REGULATION, 1.0, ""),
             enable: setting("output switch", address::ENABLE, 1.0, "", 1.0),
-            over_voltage: setting(
-                "over-voltage trip",
-                address::OVER_VOLTAGE,
-                volts,
-                "V",
-                max_v * 62.0 / 60.0,
-            ),
-            over_current: setting(
-                "over-current trip",
-                address::OVER_CURRENT,
-                amps,
-                "A",
-                max_a * 62.0 / 60.0,
-            ),
+            over_voltage: setting("over-voltage trip", address::OVER_VOLTAGE, volts, "V", max_v * 62.0 / 60.0),
+            over_current: setting("over-current trip", address::OVER_CURRENT, amps, "A", max_a * 62.0 / 60.0),
         }
     }
 }
@@ -300,23 +272,10 @@ mod tests {
             assert_eq!(Model::from_id(model.id()), Ok(model));
             let map = Map::new(model);
             assert!(map.current_set.encode(model.max_current_a()).is_ok());
-            assert!(
-                map.current_set
-                    .encode(model.max_current_a() * 1.01)
-                    .is_err()
-            );
-            assert!(
-                map.over_current
-                    .encode(model.max_current_a() * 1.02)
-                    .is_ok()
-            );
+            assert!(map.current_set.encode(model.max_current_a() * 1.01).is_err());
+            assert!(map.over_current.encode(model.max_current_a() * 1.02).is_ok());
         }
-        assert!(
-            Model::from_id(5015)
-                .unwrap_err()
-                .to_string()
-                .contains("5015")
-        );
+        assert!(Model::from_id(5015).unwrap_err().to_string().contains("5015"));
     }
 
     #[test]
@@ -335,21 +294,8 @@ mod tests {
         block[usize::from(address::ENABLE - Map::BLOCK_ADDRESS)] = 1;
         block[usize::from(address::EXTERNAL_TEMPERATURE + 1 - Map::BLOCK_ADDRESS)] = 41;
         block[usize::from(address::CURRENT_OUT - Map::BLOCK_ADDRESS)] = 500;
-        assert_eq!(
-            map.enable.decode_from(Map::BLOCK_ADDRESS, &block).unwrap(),
-            1.0
-        );
-        assert_eq!(
-            map.current_out
-                .decode_from(Map::BLOCK_ADDRESS, &block)
-                .unwrap(),
-            0.5
-        );
-        assert_eq!(
-            map.temperature
-                .decode_from(Map::BLOCK_ADDRESS, &block)
-                .unwrap(),
-            41.0
-        );
+        assert_eq!(map.enable.decode_from(Map::BLOCK_ADDRESS, &block).unwrap(), 1.0);
+        assert_eq!(map.current_out.decode_from(Map::BLOCK_ADDRESS, &block).unwrap(), 0.5);
+        assert_eq!(map.temperature.decode_from(Map::BLOCK_ADDRESS, &block).unwrap(), 41.0);
     }
 }

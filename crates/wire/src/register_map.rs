@@ -85,16 +85,7 @@ impl RegisterDef {
         access: Access,
     ) -> Self {
         let (min_raw, max_raw) = kind.limits();
-        Self {
-            name: Cow::Borrowed(name),
-            address,
-            kind,
-            scale,
-            unit: Cow::Borrowed(unit),
-            access,
-            min_raw,
-            max_raw,
-        }
+        Self { name: Cow::Borrowed(name), address, kind, scale, unit: Cow::Borrowed(unit), access, min_raw, max_raw }
     }
 
     /// The same with the device's own limits, raw and inclusive.
@@ -112,10 +103,7 @@ impl RegisterDef {
 
     /// Limits of the value, in `unit`.
     pub fn limits(&self) -> (f64, f64) {
-        (
-            self.min_raw as f64 * self.scale,
-            self.max_raw as f64 * self.scale,
-        )
+        (self.min_raw as f64 * self.scale, self.max_raw as f64 * self.scale)
     }
 
     /// The registers that hold `value`, rounded to the nearest step.
@@ -168,10 +156,10 @@ impl RegisterDef {
         Ok(match (self.kind, registers) {
             (RegisterKind::U16, &[word]) => i64::from(word),
             (RegisterKind::I16, &[word]) => i64::from(word.cast_signed()),
-            (RegisterKind::U32LowFirst, &[low, high])
-            | (RegisterKind::U32HighFirst, &[high, low]) => i64::from(join(low, high)),
-            (RegisterKind::I32LowFirst, &[low, high])
-            | (RegisterKind::I32HighFirst, &[high, low]) => {
+            (RegisterKind::U32LowFirst, &[low, high]) | (RegisterKind::U32HighFirst, &[high, low]) => {
+                i64::from(join(low, high))
+            }
+            (RegisterKind::I32LowFirst, &[low, high]) | (RegisterKind::I32HighFirst, &[high, low]) => {
                 i64::from(join(low, high).cast_signed())
             }
             (RegisterKind::SignMagnitude, &[sign, magnitude]) => {
@@ -241,9 +229,7 @@ impl RegisterDef {
 #[non_exhaustive]
 pub enum RegisterError {
     /// The device does not accept the value.
-    #[error(
-        "{name} at {address:04X}h: {value} {unit} is outside {min} to {max} {unit}: choose a value inside"
-    )]
+    #[error("{name} at {address:04X}h: {value} {unit} is outside {min} to {max} {unit}: choose a value inside")]
     OutOfRange {
         /// Register name.
         name: Cow<'static, str>,
@@ -310,20 +296,9 @@ mod tests {
 
     #[test]
     fn word_orders() {
-        assert_eq!(
-            def(RegisterKind::I32LowFirst).encode(-1.0).unwrap(),
-            [0xFFF6, 0xFFFF]
-        );
-        assert_eq!(
-            def(RegisterKind::U32HighFirst)
-                .encode_raw(0x0001_0002)
-                .unwrap(),
-            [1, 2]
-        );
-        assert_eq!(
-            def(RegisterKind::SignMagnitude).encode_raw(-25).unwrap(),
-            [1, 25]
-        );
+        assert_eq!(def(RegisterKind::I32LowFirst).encode(-1.0).unwrap(), [0xFFF6, 0xFFFF]);
+        assert_eq!(def(RegisterKind::U32HighFirst).encode_raw(0x0001_0002).unwrap(), [1, 2]);
+        assert_eq!(def(RegisterKind::SignMagnitude).encode_raw(-25).unwrap(), [1, 25]);
         assert_eq!(def(RegisterKind::I16).encode(-0.1).unwrap(), [0xFFFF]);
     }
 
@@ -332,10 +307,7 @@ mod tests {
         let speed = def(RegisterKind::I32LowFirst).limited(-50_000, 50_000);
         assert_eq!(speed.encode(5000.0).unwrap(), [50_000, 0]);
         let error = speed.encode(5000.1).unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "test at 0112h: 5000.1 rpm is outside -5000 to 5000 rpm: choose a value inside"
-        );
+        assert_eq!(error, "test at 0112h: 5000.1 rpm is outside -5000 to 5000 rpm: choose a value inside");
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
             assert!(speed.encode(value).is_err(), "{value}");
         }

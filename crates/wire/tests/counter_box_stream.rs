@@ -4,8 +4,7 @@
 
 use proptest::prelude::*;
 use wire::counter_box::{
-    Ack, AckStatus, BoxStatus, Command, Encoder, Frame, Identity, SampleFlags, Samples,
-    StreamDecoder,
+    Ack, AckStatus, BoxStatus, Command, Encoder, Frame, Identity, SampleFlags, Samples, StreamDecoder,
 };
 
 fn samples() -> impl Strategy<Value = Samples> {
@@ -16,11 +15,8 @@ fn samples() -> impl Strategy<Value = Samples> {
         prop::collection::vec((delta.clone(), delta), 0..130),
     )
         .prop_map(|(head, counts, deltas)| {
-            let column = |pick: fn(&(i32, i32)) -> i32| {
-                std::iter::once(0)
-                    .chain(deltas.iter().map(pick))
-                    .collect::<Vec<i32>>()
-            };
+            let column =
+                |pick: fn(&(i32, i32)) -> i32| std::iter::once(0).chain(deltas.iter().map(pick)).collect::<Vec<i32>>();
             Samples {
                 sequence: head.0,
                 device_time_ns: head.1,
@@ -100,19 +96,13 @@ fn a_lost_frame_is_counted_in_samples() {
     let stream = encoded(&[batch(0, 0, 100), batch(1, 100, 100), batch(2, 200, 50)]);
     let (frames, decoder) = decoded(&[stream[0].clone(), stream[2].clone()].concat());
     assert_eq!(frames.len(), 2);
-    assert_eq!(
-        (decoder.stats().samples_lost, decoder.stats().sequence_gaps),
-        (100, 1)
-    );
+    assert_eq!((decoder.stats().samples_lost, decoder.stats().sequence_gaps), (100, 1));
 }
 
 #[test]
 fn an_overflow_in_the_box_jumps_samples_but_not_frames() {
     let (_, decoder) = decoded(&encoded(&[batch(0, 0, 100), batch(1, 700, 100)]).concat());
-    assert_eq!(
-        (decoder.stats().samples_lost, decoder.stats().sequence_gaps),
-        (600, 0)
-    );
+    assert_eq!((decoder.stats().samples_lost, decoder.stats().sequence_gaps), (600, 0));
 }
 
 #[test]
@@ -120,10 +110,7 @@ fn a_restart_is_not_a_loss() {
     let stream = encoded(&[batch(7, 700, 100), batch(0, 0, 100), batch(1, 100, 100)]).concat();
     let (frames, decoder) = decoded(&stream);
     assert_eq!(frames.len(), 3);
-    assert_eq!(
-        (decoder.stats().samples_lost, decoder.stats().sequence_gaps),
-        (0, 0)
-    );
+    assert_eq!((decoder.stats().samples_lost, decoder.stats().sequence_gaps), (0, 0));
 }
 
 #[test]

@@ -6,16 +6,12 @@
 #![allow(clippy::unwrap_used)]
 
 use wire::counter_box::{
-    Ack, AckStatus, BoxStatus, Command, Encoder, Frame, Identity, PROTOCOL_VERSION, SampleFlags,
-    Samples, StreamDecoder,
+    Ack, AckStatus, BoxStatus, Command, Encoder, Frame, Identity, PROTOCOL_VERSION, SampleFlags, Samples, StreamDecoder,
 };
 
 #[track_caller]
 fn frozen(frame: &Frame, hex: &str) {
-    let expected: Vec<u8> = hex
-        .split_whitespace()
-        .map(|byte| u8::from_str_radix(byte, 16).unwrap())
-        .collect();
+    let expected: Vec<u8> = hex.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect();
     let mut bytes = Vec::new();
     Encoder::new().frame(frame, &mut bytes).unwrap();
     let printed: Vec<String> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
@@ -32,53 +28,28 @@ fn version() {
 
 #[test]
 fn identify() {
-    frozen(
-        &Frame::Command(Command::Identify { request_id: 1 }),
-        "03 01 01 05 64 82 98 E7 00",
-    );
+    frozen(&Frame::Command(Command::Identify { request_id: 1 }), "03 01 01 05 64 82 98 E7 00");
 }
 
 #[test]
 fn start() {
-    let command = Command::Start {
-        request_id: 2,
-        sample_period_ns: 100_000,
-        samples_per_frame: 100,
-    };
-    frozen(
-        &Frame::Command(command),
-        "03 02 02 04 A0 86 01 02 64 05 4F A6 4D 14 00",
-    );
+    let command = Command::Start { request_id: 2, sample_period_ns: 100_000, samples_per_frame: 100 };
+    frozen(&Frame::Command(command), "03 02 02 04 A0 86 01 02 64 05 4F A6 4D 14 00");
 }
 
 #[test]
 fn stop() {
-    frozen(
-        &Frame::Command(Command::Stop { request_id: 0x1234 }),
-        "08 03 34 12 F4 E5 94 B5 00",
-    );
+    frozen(&Frame::Command(Command::Stop { request_id: 0x1234 }), "08 03 34 12 F4 E5 94 B5 00");
 }
 
 #[test]
 fn ack_done() {
-    frozen(
-        &Frame::Ack(Ack {
-            request_id: 2,
-            status: AckStatus::Done,
-        }),
-        "03 82 02 01 05 C2 75 90 65 00",
-    );
+    frozen(&Frame::Ack(Ack { request_id: 2, status: AckStatus::Done }), "03 82 02 01 05 C2 75 90 65 00");
 }
 
 #[test]
 fn ack_refused() {
-    frozen(
-        &Frame::Ack(Ack {
-            request_id: 3,
-            status: AckStatus::BadPeriod,
-        }),
-        "03 82 03 06 01 63 2F 55 13 00",
-    );
+    frozen(&Frame::Ack(Ack { request_id: 3, status: AckStatus::BadPeriod }), "03 82 03 06 01 63 2F 55 13 00");
 }
 
 #[test]

@@ -4,14 +4,13 @@
 
 use proptest::prelude::*;
 use wire::modbus::{
-    ClientDecoder, ExceptionCode, Incoming, Request, Response, ServerDecoder, ServerFrame,
-    encode_request, encode_response,
+    ClientDecoder, ExceptionCode, Incoming, Request, Response, ServerDecoder, ServerFrame, encode_request,
+    encode_response,
 };
 
 fn request() -> impl Strategy<Value = Request> {
     prop_oneof![
-        (0..0xFF00u16, 1..=125u16)
-            .prop_map(|(address, count)| Request::ReadHolding { address, count }),
+        (0..0xFF00u16, 1..=125u16).prop_map(|(address, count)| Request::ReadHolding { address, count }),
         any::<(u16, u16)>().prop_map(|(address, value)| Request::WriteSingle { address, value }),
         (0..0xFF00u16, prop::collection::vec(any::<u16>(), 1..=123))
             .prop_map(|(address, values)| Request::WriteMultiple { address, values }),
@@ -21,17 +20,11 @@ fn request() -> impl Strategy<Value = Request> {
 /// The good answer to a request, with arbitrary register contents.
 fn answer(request: &Request, fill: u16) -> Response {
     match request {
-        Request::ReadHolding { count, .. } => {
-            Response::Registers((0..*count).map(|n| n.wrapping_mul(fill)).collect())
+        Request::ReadHolding { count, .. } => Response::Registers((0..*count).map(|n| n.wrapping_mul(fill)).collect()),
+        Request::WriteSingle { address, value } => Response::WroteSingle { address: *address, value: *value },
+        Request::WriteMultiple { address, values } => {
+            Response::WroteMultiple { address: *address, count: values.len() as u16 }
         }
-        Request::WriteSingle { address, value } => Response::WroteSingle {
-            address: *address,
-            value: *value,
-        },
-        Request::WriteMultiple { address, values } => Response::WroteMultiple {
-            address: *address,
-            count: values.len() as u16,
-        },
     }
 }
 
@@ -55,21 +48,12 @@ fn serve(decoder: &mut ServerDecoder, bytes: &[u8]) -> Vec<ServerFrame> {
 /// Delta ASDA-B2 User Manual, chapter 8: reading two words from 0200h.
 #[test]
 fn manual_example_read() {
-    let request = Request::ReadHolding {
-        address: 0x0200,
-        count: 2,
-    };
-    assert_eq!(
-        encode_request(1, &request).unwrap(),
-        [0x01, 0x03, 0x02, 0x00, 0x00, 0x02, 0xC5, 0xB3]
-    );
+    let request = Request::ReadHolding { address: 0x0200, count: 2 };
+    assert_eq!(encode_request(1, &request).unwrap(), [0x01, 0x03, 0x02, 0x00, 0x00, 0x02, 0xC5, 0xB3]);
     let bytes = [0x01, 0x03, 0x04, 0x00, 0xB1, 0x1F, 0x40, 0xA3, 0xD4];
     let response = Response::Registers(vec![0x00B1, 0x1F40]);
     assert_eq!(encode_response(1, 3, &response).unwrap(), bytes);
-    assert_eq!(
-        ClientDecoder::new(1, &request).feed(&bytes),
-        Ok(Some(response))
-    );
+    assert_eq!(ClientDecoder::new(1, &request).feed(&bytes), Ok(Some(response)));
 }
 
 proptest! {

@@ -10,17 +10,13 @@ use super::{MAX_SAMPLES_PER_FRAME, MAX_TEXT, kind, varint};
 #[non_exhaustive]
 pub enum MalformedFrame {
     /// No such type.
-    #[error(
-        "counter box frame of unknown type {kind:02X}h: box and host speak different versions; update one of them"
-    )]
+    #[error("counter box frame of unknown type {kind:02X}h: box and host speak different versions; update one of them")]
     UnknownType {
         /// Type byte.
         kind: u8,
     },
     /// Too few or too many bytes for the type.
-    #[error(
-        "counter box frame of type {kind:02X}h: its {len} bytes do not fit its content: update the box's firmware"
-    )]
+    #[error("counter box frame of type {kind:02X}h: its {len} bytes do not fit its content: update the box's firmware")]
     Length {
         /// Type byte.
         kind: u8,
@@ -28,9 +24,7 @@ pub enum MalformedFrame {
         len: usize,
     },
     /// No samples, or more than a frame may carry.
-    #[error(
-        "counter box frame with {count} samples; 1 to {limit} are allowed: set samples_per_frame within that"
-    )]
+    #[error("counter box frame with {count} samples; 1 to {limit} are allowed: set samples_per_frame within that")]
     SampleCount {
         /// Samples announced.
         count: u16,
@@ -38,9 +32,7 @@ pub enum MalformedFrame {
         limit: u16,
     },
     /// A text too long or not UTF-8.
-    #[error(
-        "counter box identity with a bad {field} text of {len} bytes; at most {limit} bytes of UTF-8 are allowed"
-    )]
+    #[error("counter box identity with a bad {field} text of {len} bytes; at most {limit} bytes of UTF-8 are allowed")]
     Text {
         /// Which text.
         field: &'static str,
@@ -103,10 +95,7 @@ pub(super) fn parse(body: &[u8]) -> Result<Frame, MalformedFrame> {
     };
     match frame {
         Some(frame) if reader.0.is_empty() => Ok(frame),
-        _ => Err(MalformedFrame::Length {
-            kind,
-            len: body.len(),
-        }),
+        _ => Err(MalformedFrame::Length { kind, len: body.len() }),
     }
 }
 
@@ -114,20 +103,13 @@ fn command(kind: u8, reader: &mut Reader<'_>) -> Option<Command> {
     let request_id = reader.u16()?;
     Some(match kind {
         kind::IDENTIFY => Command::Identify { request_id },
-        kind::START => Command::Start {
-            request_id,
-            sample_period_ns: reader.u32()?,
-            samples_per_frame: reader.u16()?,
-        },
+        kind::START => Command::Start { request_id, sample_period_ns: reader.u32()?, samples_per_frame: reader.u16()? },
         _ => Command::Stop { request_id },
     })
 }
 
 fn ack(reader: &mut Reader<'_>) -> Option<Ack> {
-    Some(Ack {
-        request_id: reader.u16()?,
-        status: AckStatus::from_code(reader.u8()?),
-    })
+    Some(Ack { request_id: reader.u16()?, status: AckStatus::from_code(reader.u8()?) })
 }
 
 fn identity(reader: &mut Reader<'_>) -> Result<Option<Identity>, MalformedFrame> {
@@ -148,18 +130,11 @@ fn identity(reader: &mut Reader<'_>) -> Result<Option<Identity>, MalformedFrame>
     let Some(mut identity) = fixed() else {
         return Ok(None);
     };
-    for (field, target) in [
-        ("serial", &mut identity.serial),
-        ("firmware", &mut identity.firmware),
-    ] {
+    for (field, target) in [("serial", &mut identity.serial), ("firmware", &mut identity.firmware)] {
         let Some(bytes) = reader.u8().and_then(|len| reader.bytes(usize::from(len))) else {
             return Ok(None);
         };
-        let bad = MalformedFrame::Text {
-            field,
-            len: bytes.len(),
-            limit: MAX_TEXT,
-        };
+        let bad = MalformedFrame::Text { field, len: bytes.len(), limit: MAX_TEXT };
         match std::str::from_utf8(bytes) {
             Ok(text) if bytes.len() <= MAX_TEXT => target.push_str(text),
             _ => return Err(bad),
@@ -189,10 +164,7 @@ fn samples(reader: &mut Reader<'_>) -> Result<Option<Samples>, MalformedFrame> {
         return Ok(None);
     };
     if count == 0 || count > MAX_SAMPLES_PER_FRAME {
-        return Err(MalformedFrame::SampleCount {
-            count,
-            limit: MAX_SAMPLES_PER_FRAME,
-        });
+        return Err(MalformedFrame::SampleCount { count, limit: MAX_SAMPLES_PER_FRAME });
     }
     let count = usize::from(count);
     for deltas in [&mut samples.input_delta, &mut samples.output_delta] {

@@ -138,10 +138,7 @@ impl StreamDecoder {
         if let Some((sequence, first_sample)) = self.expected
             && samples.first_sample >= first_sample
         {
-            self.stats.samples_lost = self
-                .stats
-                .samples_lost
-                .saturating_add(samples.first_sample - first_sample);
+            self.stats.samples_lost = self.stats.samples_lost.saturating_add(samples.first_sample - first_sample);
             self.stats.sequence_gaps += u64::from(samples.sequence.wrapping_sub(sequence));
         }
         let next_sample = samples.first_sample.saturating_add(samples.len() as u64);
@@ -151,7 +148,5 @@ impl StreamDecoder {
 
 /// Undoes COBS; `None` if the code bytes do not add up.
 fn unstuff(stuffed: &[u8], plain: &mut [u8]) -> Option<usize> {
-    cobs::decode(stuffed, plain)
-        .ok()
-        .map(|report| report.frame_size())
+    cobs::decode(stuffed, plain).ok().map(|report| report.frame_size())
 }

@@ -18,9 +18,7 @@ pub enum EncodeError {
         limit: u16,
     },
     /// The two channels differ in length.
-    #[error(
-        "a samples frame of {input} input and {output} output deltas: give both the same length"
-    )]
+    #[error("a samples frame of {input} input and {output} output deltas: give both the same length")]
     UnequalChannels {
         /// Input deltas.
         input: usize,
@@ -82,12 +80,7 @@ impl Encoder {
         };
         self.begin(kind);
         self.put(&command.request_id().to_le_bytes());
-        if let Command::Start {
-            sample_period_ns,
-            samples_per_frame,
-            ..
-        } = command
-        {
+        if let Command::Start { sample_period_ns, samples_per_frame, .. } = command {
             self.put(&sample_period_ns.to_le_bytes());
             self.put(&samples_per_frame.to_le_bytes());
         }
@@ -107,17 +100,10 @@ impl Encoder {
     /// # Errors
     /// [`EncodeError::Text`] when a text is too long.
     pub fn identity(&mut self, identity: &Identity, out: &mut Vec<u8>) -> Result<(), EncodeError> {
-        let texts = [
-            ("serial", identity.serial.as_bytes()),
-            ("firmware", identity.firmware.as_bytes()),
-        ];
+        let texts = [("serial", identity.serial.as_bytes()), ("firmware", identity.firmware.as_bytes())];
         for (field, text) in texts {
             if text.len() > MAX_TEXT {
-                return Err(EncodeError::Text {
-                    field,
-                    len: text.len(),
-                    limit: MAX_TEXT,
-                });
+                return Err(EncodeError::Text { field, len: text.len(), limit: MAX_TEXT });
             }
         }
         self.begin(kind::IDENTITY);
@@ -156,8 +142,7 @@ impl Encoder {
         self.put(&samples.output_base.to_le_bytes());
         self.put(&count.to_le_bytes());
         debug_assert_eq!(self.plain.len(), SAMPLES_HEAD);
-        self.plain
-            .resize(SAMPLES_HEAD + 2 * varint::MAX_LEN * usize::from(count), 0);
+        self.plain.resize(SAMPLES_HEAD + 2 * varint::MAX_LEN * usize::from(count), 0);
         let middle = varint::write(&mut self.plain, SAMPLES_HEAD, &samples.input_delta);
         let end = varint::write(&mut self.plain, middle, &samples.output_delta);
         self.plain.truncate(end);
@@ -188,20 +173,14 @@ fn check(samples: &Samples) -> Result<u16, EncodeError> {
     if input != output {
         return Err(EncodeError::UnequalChannels { input, output });
     }
-    for (channel, deltas) in [
-        ("input", &samples.input_delta),
-        ("output", &samples.output_delta),
-    ] {
+    for (channel, deltas) in [("input", &samples.input_delta), ("output", &samples.output_delta)] {
         if let Some(&delta) = deltas.first().filter(|delta| **delta != 0) {
             return Err(EncodeError::FirstDelta { channel, delta });
         }
     }
     match u16::try_from(input) {
         Ok(count) if count != 0 && count <= MAX_SAMPLES_PER_FRAME => Ok(count),
-        _ => Err(EncodeError::SampleCount {
-            count: input,
-            limit: MAX_SAMPLES_PER_FRAME,
-        }),
+        _ => Err(EncodeError::SampleCount { count: input, limit: MAX_SAMPLES_PER_FRAME }),
     }
 }
 
@@ -235,17 +214,8 @@ mod tests {
         for samples in bad {
             assert!(encoder.samples(&samples, &mut out).is_err());
         }
-        let long = Identity {
-            serial: "x".repeat(65),
-            ..identity()
-        };
-        assert!(
-            encoder
-                .identity(&long, &mut out)
-                .unwrap_err()
-                .to_string()
-                .contains("serial text has 65 bytes")
-        );
+        let long = Identity { serial: "x".repeat(65), ..identity() };
+        assert!(encoder.identity(&long, &mut out).unwrap_err().to_string().contains("serial text has 65 bytes"));
         assert_eq!(out, [7]);
     }
 

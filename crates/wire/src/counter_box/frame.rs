@@ -44,9 +44,7 @@ impl Command {
     /// Number that the answer repeats.
     pub fn request_id(&self) -> RequestId {
         match *self {
-            Self::Identify { request_id }
-            | Self::Start { request_id, .. }
-            | Self::Stop { request_id } => request_id,
+            Self::Identify { request_id } | Self::Start { request_id, .. } | Self::Stop { request_id } => request_id,
         }
     }
 }
@@ -243,10 +241,7 @@ mod tests {
         };
         assert_eq!(samples.input_counts().collect::<Vec<_>>(), [100, 103, 102]);
         // A counter wraps; it does not panic.
-        assert_eq!(
-            samples.output_counts().collect::<Vec<_>>(),
-            [i64::MAX, i64::MIN, i64::MAX]
-        );
+        assert_eq!(samples.output_counts().collect::<Vec<_>>(), [i64::MAX, i64::MIN, i64::MAX]);
     }
 
     #[test]

@@ -12,9 +12,7 @@ mod varint;
 pub use body::MalformedFrame;
 pub use decode::{StreamDecoder, StreamStats};
 pub use encode::{EncodeError, Encoder};
-pub use frame::{
-    Ack, AckStatus, BoxStatus, Command, Frame, Identity, RequestId, SampleFlags, Samples,
-};
+pub use frame::{Ack, AckStatus, BoxStatus, Command, Frame, Identity, RequestId, SampleFlags, Samples};
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 

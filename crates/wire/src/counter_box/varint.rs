@@ -78,10 +78,7 @@ mod tests {
 
     #[test]
     fn known_encodings() {
-        assert_eq!(
-            bytes(&[0, -1, 1, -64, 63, 64]),
-            [0, 1, 2, 127, 126, 0x80, 1]
-        );
+        assert_eq!(bytes(&[0, -1, 1, -64, 63, 64]), [0, 1, 2, 127, 126, 0x80, 1]);
         assert_eq!(bytes(&[i32::MIN]), [0xFF, 0xFF, 0xFF, 0xFF, 0x0F]);
         assert_eq!(bytes(&[i32::MAX]), [0xFE, 0xFF, 0xFF, 0xFF, 0x0F]);
     }

@@ -21,12 +21,7 @@ impl ClientDecoder {
     /// For the answer of `unit` to `request`.
     pub fn new(unit: u8, request: &Request) -> Self {
         let buffer = Vec::with_capacity(request.response_len());
-        Self {
-            unit,
-            request: request.clone(),
-            buffer,
-            answered: false,
-        }
+        Self { unit, request: request.clone(), buffer, answered: false }
     }
 
     /// Bytes that have arrived so far.
@@ -105,20 +100,10 @@ impl ClientDecoder {
         let request = || self.request.clone();
         let Some((body, found, expected)) = split_crc(&self.buffer) else {
             // Not reachable: every expected length is at least 5.
-            return Err(ResponseError::TooLong {
-                request: request(),
-                found: 0,
-                expected: 0,
-                bytes: self.hex(),
-            });
+            return Err(ResponseError::TooLong { request: request(), found: 0, expected: 0, bytes: self.hex() });
         };
         if found != expected {
-            return Err(ResponseError::CrcMismatch {
-                request: request(),
-                found,
-                expected,
-                bytes: self.hex(),
-            });
+            return Err(ResponseError::CrcMismatch { request: request(), found, expected, bytes: self.hex() });
         }
         if body[0] != self.unit {
             return Err(ResponseError::WrongUnit {
@@ -133,24 +118,12 @@ impl ClientDecoder {
         }
         let (expected_address, expected_value, response) = match &self.request {
             Request::ReadHolding { .. } => return Ok(Response::Registers(words(&body[3..]))),
-            Request::WriteSingle { address, value } => (
-                *address,
-                *value,
-                Response::WroteSingle {
-                    address: *address,
-                    value: *value,
-                },
-            ),
+            Request::WriteSingle { address, value } => {
+                (*address, *value, Response::WroteSingle { address: *address, value: *value })
+            }
             Request::WriteMultiple { address, .. } => {
                 let count = self.request.count();
-                (
-                    *address,
-                    count,
-                    Response::WroteMultiple {
-                        address: *address,
-                        count,
-                    },
-                )
+                (*address, count, Response::WroteMultiple { address: *address, count })
             }
         };
         let found_address = u16::from_be_bytes([body[2], body[3]]);
@@ -174,10 +147,7 @@ mod tests {
     use super::*;
     use crate::modbus::encode_response;
 
-    const READ: Request = Request::ReadHolding {
-        address: 0x0058,
-        count: 2,
-    };
+    const READ: Request = Request::ReadHolding { address: 0x0058, count: 2 };
 
     fn answer(unit: u8, function: u8, response: &Response) -> Vec<u8> {
         encode_response(unit, function, response).unwrap()
@@ -197,10 +167,7 @@ mod tests {
     fn exception_is_a_good_answer() {
         let exception = Response::Exception(ExceptionCode::ServerDeviceBusy);
         let bytes = answer(1, 3, &exception);
-        assert_eq!(
-            ClientDecoder::new(1, &READ).feed(&bytes),
-            Ok(Some(exception))
-        );
+        assert_eq!(ClientDecoder::new(1, &READ).feed(&bytes), Ok(Some(exception)));
     }
 
     #[test]
@@ -208,72 +175,19 @@ mod tests {
         let good = answer(1, 3, &Response::Registers(vec![1, 2]));
         let feed = |request: &Request, bytes: &[u8]| ClientDecoder::new(1, request).feed(bytes);
         let other_unit = answer(2, 3, &Response::Registers(vec![1, 2]));
-        assert!(matches!(
-            feed(&READ, &other_unit),
-            Err(ResponseError::WrongUnit {
-                found: 2,
-                expected: 1,
-                ..
-            })
-        ));
-        assert!(matches!(
-            feed(&READ, &[1, 4, 4]),
-            Err(ResponseError::WrongFunction { found: 4, .. })
-        ));
+        assert!(matches!(feed(&READ, &other_unit), Err(ResponseError::WrongUnit { found: 2, expected: 1, .. })));
+        assert!(matches!(feed(&READ, &[1, 4, 4]), Err(ResponseError::WrongFunction { found: 4, .. })));
         let longer = answer(1, 3, &Response::Registers(vec![1, 2, 3]));
-        assert!(matches!(
-            feed(&READ, &longer),
-            Err(ResponseError::WrongByteCount {
-                found: 6,
-                expected: 4,
-                ..
-            })
-        ));
+        assert!(matches!(feed(&READ, &longer), Err(ResponseError::WrongByteCount { found: 6, expected: 4, .. })));
         let twice = [good.clone(), good].concat();
-        assert!(matches!(
-            feed(&READ, &twice),
-            Err(ResponseError::TooLong {
-                found: 18,
-                expected: 9,
-                ..
-            })
-        ));
+        assert!(matches!(feed(&READ, &twice), Err(ResponseError::TooLong { found: 18, expected: 9, .. })));
 
-        let write = Request::WriteSingle {
-            address: 0x0112,
-            value: 5,
-        };
-        let echo = answer(
-            1,
-            6,
-            &Response::WroteSingle {
-                address: 0x0112,
-                value: 6,
-            },
-        );
-        assert!(matches!(
-            feed(&write, &echo),
-            Err(ResponseError::WrongEcho { found_value: 6, .. })
-        ));
-        let write = Request::WriteMultiple {
-            address: 0x0112,
-            values: vec![5, 6],
-        };
-        let echo = answer(
-            1,
-            16,
-            &Response::WroteMultiple {
-                address: 0x0114,
-                count: 2,
-            },
-        );
-        assert!(matches!(
-            feed(&write, &echo),
-            Err(ResponseError::WrongEcho {
-                found_address: 0x0114,
-                ..
-            })
-        ));
+        let write = Request::WriteSingle { address: 0x0112, value: 5 };
+        let echo = answer(1, 6, &Response::WroteSingle { address: 0x0112, value: 6 });
+        assert!(matches!(feed(&write, &echo), Err(ResponseError::WrongEcho { found_value: 6, .. })));
+        let write = Request::WriteMultiple { address: 0x0112, values: vec![5, 6] };
+        let echo = answer(1, 16, &Response::WroteMultiple { address: 0x0114, count: 2 });
+        assert!(matches!(feed(&write, &echo), Err(ResponseError::WrongEcho { found_address: 0x0114, .. })));
     }
 
     #[test]
@@ -281,25 +195,16 @@ mod tests {
         let echo = crate::modbus::encode_request(1, &READ).unwrap();
         assert!(matches!(
             ClientDecoder::new(1, &READ).feed(&echo),
-            Err(ResponseError::WrongByteCount {
-                found: 0,
-                expected: 4,
-                ..
-            })
+            Err(ResponseError::WrongByteCount { found: 0, expected: 4, .. })
         ));
     }
 
     #[test]
     fn bytes_after_the_answer_are_an_error_that_shows_them() {
         let mut decoder = ClientDecoder::new(1, &READ);
-        decoder
-            .feed(&answer(1, 3, &Response::Registers(vec![1, 2])))
-            .unwrap();
+        decoder.feed(&answer(1, 3, &Response::Registers(vec![1, 2]))).unwrap();
         let error = decoder.feed(&[0xAA]).unwrap_err().to_string();
-        assert!(
-            error.contains("10 bytes instead of 9") && error.ends_with("ask again"),
-            "{error}"
-        );
+        assert!(error.contains("10 bytes instead of 9") && error.ends_with("ask again"), "{error}");
         assert!(error.contains("01 03 04 00 01 00 02"), "{error}");
     }
 }

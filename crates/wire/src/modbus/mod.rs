@@ -16,10 +16,7 @@ mod timing;
 
 pub use client::ClientDecoder;
 pub use error::{EncodeError, ResponseError};
-pub use pdu::{
-    ExceptionCode, MAX_READ_COUNT, MAX_WRITE_COUNT, Request, Response, encode_request,
-    encode_response,
-};
+pub use pdu::{ExceptionCode, MAX_READ_COUNT, MAX_WRITE_COUNT, Request, Response, encode_request, encode_response};
 pub use server::{Incoming, ServerDecoder, ServerFrame, ServerStats};
 pub use timing::{LineSettings, Parity, frame_time, inter_character_timeout, inter_frame_silence};
 
@@ -54,8 +51,5 @@ fn split_crc(frame: &[u8]) -> Option<(&[u8], u16, u16)> {
 
 /// Big-endian words of a data field; an odd byte at the end is not a word and is left out.
 fn words(bytes: &[u8]) -> Vec<u16> {
-    bytes
-        .chunks_exact(2)
-        .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
-        .collect()
+    bytes.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect()
 }

@@ -83,19 +83,10 @@ impl Request {
             Self::WriteMultiple { values, .. } => (values.len(), MAX_WRITE_COUNT),
         };
         if count == 0 || count > usize::from(limit) {
-            return Err(EncodeError::Count {
-                function: self.function(),
-                address: self.address(),
-                count,
-                limit,
-            });
+            return Err(EncodeError::Count { function: self.function(), address: self.address(), count, limit });
         }
         if usize::from(self.address()) + count > 0x1_0000 {
-            return Err(EncodeError::PastEnd {
-                function: self.function(),
-                address: self.address(),
-                count,
-            });
+            return Err(EncodeError::PastEnd { function: self.function(), address: self.address(), count });
         }
         Ok(())
     }
@@ -233,21 +224,12 @@ pub fn encode_request(unit: u8, request: &Request) -> Result<Vec<u8>, EncodeErro
 ///
 /// # Errors
 /// [`EncodeError`] when more registers are given than a frame can carry.
-pub fn encode_response(
-    unit: u8,
-    function: u8,
-    response: &Response,
-) -> Result<Vec<u8>, EncodeError> {
+pub fn encode_response(unit: u8, function: u8, response: &Response) -> Result<Vec<u8>, EncodeError> {
     let mut frame = vec![unit, function];
     match response {
         Response::Registers(values) => {
             if values.is_empty() || values.len() > usize::from(MAX_READ_COUNT) {
-                return Err(EncodeError::Count {
-                    function,
-                    address: 0,
-                    count: values.len(),
-                    limit: MAX_READ_COUNT,
-                });
+                return Err(EncodeError::Count { function, address: 0, count: values.len(), limit: MAX_READ_COUNT });
             }
             push_words(&mut frame, values);
         }
@@ -281,97 +263,41 @@ mod tests {
     // Delta ASDA-B2 User Manual (May 2018), p. 8-13 and 8-14: writing P1-09 and P2-00.
     #[test]
     fn manual_example_write_multiple() {
-        let request = Request::WriteMultiple {
-            address: 0x0112,
-            values: vec![0x0BB8, 0x0000],
-        };
+        let request = Request::WriteMultiple { address: 0x0112, values: vec![0x0BB8, 0x0000] };
         let bytes = encode_request(1, &request).unwrap();
-        assert_eq!(
-            bytes,
-            [
-                0x01, 0x10, 0x01, 0x12, 0x00, 0x02, 0x04, 0x0B, 0xB8, 0x00, 0x00, 0xFC, 0xEB
-            ]
-        );
-        let answer = encode_response(
-            1,
-            0x10,
-            &Response::WroteMultiple {
-                address: 0x0112,
-                count: 2,
-            },
-        )
-        .unwrap();
+        assert_eq!(bytes, [0x01, 0x10, 0x01, 0x12, 0x00, 0x02, 0x04, 0x0B, 0xB8, 0x00, 0x00, 0xFC, 0xEB]);
+        let answer = encode_response(1, 0x10, &Response::WroteMultiple { address: 0x0112, count: 2 }).unwrap();
         assert_eq!(answer, [0x01, 0x10, 0x01, 0x12, 0x00, 0x02, 0xE0, 0x31]);
     }
 
     #[test]
     fn manual_example_write_single() {
-        let request = Request::WriteSingle {
-            address: 0x0200,
-            value: 0x0064,
-        };
+        let request = Request::WriteSingle { address: 0x0200, value: 0x0064 };
         let bytes = [0x01, 0x06, 0x02, 0x00, 0x00, 0x64, 0x89, 0x99];
         assert_eq!(encode_request(1, &request).unwrap(), bytes);
-        let answer = encode_response(
-            1,
-            6,
-            &Response::WroteSingle {
-                address: 0x0200,
-                value: 0x0064,
-            },
-        )
-        .unwrap();
+        let answer = encode_response(1, 6, &Response::WroteSingle { address: 0x0200, value: 0x0064 }).unwrap();
         assert_eq!(answer, bytes, "function 06 answers with the request itself");
     }
 
     #[test]
     fn exception_sets_the_highest_bit() {
-        let bytes = encode_response(
-            1,
-            3,
-            &Response::Exception(ExceptionCode::IllegalDataAddress),
-        )
-        .unwrap();
+        let bytes = encode_response(1, 3, &Response::Exception(ExceptionCode::IllegalDataAddress)).unwrap();
         assert_eq!(bytes, [0x01, 0x83, 0x02, 0xC0, 0xF1]);
     }
 
     #[test]
     fn impossible_counts_are_refused() {
         let cases = [
-            Request::ReadHolding {
-                address: 0,
-                count: 0,
-            },
-            Request::ReadHolding {
-                address: 0,
-                count: 126,
-            },
-            Request::ReadHolding {
-                address: 0xFFFF,
-                count: 2,
-            },
-            Request::WriteMultiple {
-                address: 0,
-                values: vec![],
-            },
-            Request::WriteMultiple {
-                address: 0,
-                values: vec![0; 124],
-            },
+            Request::ReadHolding { address: 0, count: 0 },
+            Request::ReadHolding { address: 0, count: 126 },
+            Request::ReadHolding { address: 0xFFFF, count: 2 },
+            Request::WriteMultiple { address: 0, values: vec![] },
+            Request::WriteMultiple { address: 0, values: vec![0; 124] },
         ];
         for case in cases {
             assert!(encode_request(1, &case).is_err(), "{case}");
         }
-        assert!(
-            encode_request(
-                1,
-                &Request::ReadHolding {
-                    address: 0xFFFF,
-                    count: 1
-                }
-            )
-            .is_ok()
-        );
+        assert!(encode_request(1, &Request::ReadHolding { address: 0xFFFF, count: 1 }).is_ok());
         assert!(encode_response(1, 3, &Response::Registers(vec![0; 126])).is_err());
     }
 

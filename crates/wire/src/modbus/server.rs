@@ -145,11 +145,7 @@ fn request_len(head: &[u8]) -> Length {
     let Some(&function) = head.get(1) else {
         return Length::Unknown;
     };
-    let counted = |at: usize| {
-        head.get(at).map_or(Length::Unknown, |count| {
-            Length::Known(at + 3 + usize::from(*count))
-        })
-    };
+    let counted = |at: usize| head.get(at).map_or(Length::Unknown, |count| Length::Known(at + 3 + usize::from(*count)));
     match function {
         1..=6 | 8 => Length::Known(8),
         7 | 11 | 12 | 17 => Length::Known(4),
@@ -169,28 +165,13 @@ fn decode(frame: &[u8]) -> Option<ServerFrame> {
     let (unit, function) = (body[0], body[1]);
     let word = |at: usize| u16::from_be_bytes([body[at], body[at + 1]]);
     let incoming = match function {
-        function::READ_HOLDING => Incoming::Request(Request::ReadHolding {
-            address: word(2),
-            count: word(4),
-        }),
-        function::WRITE_SINGLE => Incoming::Request(Request::WriteSingle {
-            address: word(2),
-            value: word(4),
-        }),
+        function::READ_HOLDING => Incoming::Request(Request::ReadHolding { address: word(2), count: word(4) }),
+        function::WRITE_SINGLE => Incoming::Request(Request::WriteSingle { address: word(2), value: word(4) }),
         function::WRITE_MULTIPLE if u32::from(body[6]) == 2 * u32::from(word(4)) => {
-            Incoming::Request(Request::WriteMultiple {
-                address: word(2),
-                values: words(&body[7..]),
-            })
+            Incoming::Request(Request::WriteMultiple { address: word(2), values: words(&body[7..]) })
         }
-        function::WRITE_MULTIPLE => Incoming::Refused {
-            function,
-            exception: ExceptionCode::IllegalDataValue,
-        },
-        _ => Incoming::Refused {
-            function,
-            exception: ExceptionCode::IllegalFunction,
-        },
+        function::WRITE_MULTIPLE => Incoming::Refused { function, exception: ExceptionCode::IllegalDataValue },
+        _ => Incoming::Refused { function, exception: ExceptionCode::IllegalFunction },
     };
     Some(ServerFrame { unit, incoming })
 }
@@ -207,36 +188,20 @@ mod tests {
     }
 
     fn read() -> Request {
-        Request::ReadHolding {
-            address: 0x0058,
-            count: 6,
-        }
+        Request::ReadHolding { address: 0x0058, count: 6 }
     }
 
     #[test]
     fn frames_for_any_unit_back_to_back() {
         let mut decoder = ServerDecoder::new();
-        let write = Request::WriteMultiple {
-            address: 0x0112,
-            values: vec![50, 0],
-        };
-        let bytes = [
-            encode_request(1, &read()).unwrap(),
-            encode_request(9, &write).unwrap(),
-        ]
-        .concat();
+        let write = Request::WriteMultiple { address: 0x0112, values: vec![50, 0] };
+        let bytes = [encode_request(1, &read()).unwrap(), encode_request(9, &write).unwrap()].concat();
         let frames = feed(&mut decoder, &bytes);
         assert_eq!(
             frames,
             [
-                ServerFrame {
-                    unit: 1,
-                    incoming: Incoming::Request(read())
-                },
-                ServerFrame {
-                    unit: 9,
-                    incoming: Incoming::Request(write)
-                },
+                ServerFrame { unit: 1, incoming: Incoming::Request(read()) },
+                ServerFrame { unit: 9, incoming: Incoming::Request(write) },
             ]
         );
         assert_eq!(decoder.stats().frames, 2);
@@ -249,34 +214,18 @@ mod tests {
         let mut bad = good.clone();
         bad[3] ^= 1;
         assert!(feed(&mut decoder, &bad).is_empty());
-        assert!(
-            feed(&mut decoder, &good).is_empty(),
-            "no frame starts without a silence"
-        );
+        assert!(feed(&mut decoder, &good).is_empty(), "no frame starts without a silence");
         assert_eq!(decoder.idle(), None);
         assert_eq!(feed(&mut decoder, &good).len(), 1);
         let stats = decoder.stats();
-        assert_eq!(
-            (stats.frames, stats.crc_errors, stats.bytes_skipped),
-            (1, 1, 16)
-        );
+        assert_eq!((stats.frames, stats.crc_errors, stats.bytes_skipped), (1, 1, 16));
     }
 
     #[test]
     fn data_that_look_like_a_frame_are_not_executed() {
         // The values of the outer write are themselves a good request.
-        let inner = encode_request(
-            1,
-            &Request::WriteSingle {
-                address: 0x0112,
-                value: 30_000,
-            },
-        )
-        .unwrap();
-        let outer = Request::WriteMultiple {
-            address: 0x0400,
-            values: words(&inner),
-        };
+        let inner = encode_request(1, &Request::WriteSingle { address: 0x0112, value: 30_000 }).unwrap();
+        let outer = Request::WriteMultiple { address: 0x0400, values: words(&inner) };
         let mut bytes = encode_request(1, &outer).unwrap();
         bytes[1] ^= 0x06;
         let mut decoder = ServerDecoder::new();
@@ -299,32 +248,15 @@ mod tests {
         let mut decoder = ServerDecoder::new();
         let mut private = vec![1, 0x41, 0xAA, 0xBB];
         push_crc(&mut private);
-        assert!(
-            feed(&mut decoder, &private).is_empty(),
-            "its length is unknown until a silence"
-        );
-        let refused = |function, exception| ServerFrame {
-            unit: 1,
-            incoming: Incoming::Refused {
-                function,
-                exception,
-            },
-        };
-        assert_eq!(
-            decoder.idle(),
-            Some(refused(0x41, ExceptionCode::IllegalFunction))
-        );
+        assert!(feed(&mut decoder, &private).is_empty(), "its length is unknown until a silence");
+        let refused =
+            |function, exception| ServerFrame { unit: 1, incoming: Incoming::Refused { function, exception } };
+        assert_eq!(decoder.idle(), Some(refused(0x41, ExceptionCode::IllegalFunction)));
         let mut coils = vec![1, 1, 0, 0, 0, 8];
         push_crc(&mut coils);
-        assert_eq!(
-            feed(&mut decoder, &coils),
-            [refused(1, ExceptionCode::IllegalFunction)]
-        );
+        assert_eq!(feed(&mut decoder, &coils), [refused(1, ExceptionCode::IllegalFunction)]);
         let mut count = vec![1, 16, 0, 0, 0, 3, 4, 0, 1, 0, 2];
         push_crc(&mut count);
-        assert_eq!(
-            feed(&mut decoder, &count),
-            [refused(16, ExceptionCode::IllegalDataValue)]
-        );
+        assert_eq!(feed(&mut decoder, &count), [refused(16, ExceptionCode::IllegalDataValue)]);
     }
 }

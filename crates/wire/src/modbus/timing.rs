@@ -30,46 +30,29 @@ impl LineSettings {
 
     /// 8 data bits, no parity, `stop_bits` stop bits.
     pub const fn no_parity(baud: u32, stop_bits: u8) -> Self {
-        Self {
-            baud,
-            parity: Parity::None,
-            stop_bits,
-        }
+        Self { baud, parity: Parity::None, stop_bits }
     }
 
     /// Bits of a character: start, data, parity, stop.
     pub fn bits_per_character(&self) -> u32 {
-        1 + u32::from(Self::DATA_BITS)
-            + u32::from(self.parity != Parity::None)
-            + u32::from(self.stop_bits)
+        1 + u32::from(Self::DATA_BITS) + u32::from(self.parity != Parity::None) + u32::from(self.stop_bits)
     }
 }
 
 /// Time that `bytes` characters take on the line. A line at 0 baud never gets anything across: [`Duration::MAX`].
 pub fn frame_time(bytes: usize, settings: &LineSettings) -> Duration {
-    bit_time(
-        bytes as u128 * u128::from(settings.bits_per_character()),
-        settings.baud,
-    )
+    bit_time(bytes as u128 * u128::from(settings.bits_per_character()), settings.baud)
 }
 
 /// Silence between frames, t3.5 (V1.02 §2.5.1.1): 3.5 characters of 11 bits up to 19200 baud, 1.75 ms above.
 pub fn inter_frame_silence(baud: u32) -> Duration {
     // 3.5 * 11 bits = 77 half bits.
-    if baud > 19_200 {
-        Duration::from_micros(1750)
-    } else {
-        bit_time(77, baud) / 2
-    }
+    if baud > 19_200 { Duration::from_micros(1750) } else { bit_time(77, baud) / 2 }
 }
 
 /// Longest silence inside a frame, t1.5 (V1.02 §2.5.1.1): 1.5 characters up to 19200 baud, 750 µs above.
 pub fn inter_character_timeout(baud: u32) -> Duration {
-    if baud > 19_200 {
-        Duration::from_micros(750)
-    } else {
-        bit_time(33, baud) / 2
-    }
+    if baud > 19_200 { Duration::from_micros(750) } else { bit_time(33, baud) / 2 }
 }
 
 fn bit_time(bits: u128, baud: u32) -> Duration {
@@ -87,15 +70,7 @@ mod tests {
     fn character_lengths() {
         assert_eq!(LineSettings::no_parity(38_400, 2).bits_per_character(), 11);
         assert_eq!(LineSettings::no_parity(38_400, 1).bits_per_character(), 10);
-        assert_eq!(
-            LineSettings {
-                baud: 9600,
-                parity: Parity::Even,
-                stop_bits: 1
-            }
-            .bits_per_character(),
-            11
-        );
+        assert_eq!(LineSettings { baud: 9600, parity: Parity::Even, stop_bits: 1 }.bits_per_character(), 11);
     }
 
     #[test]
