@@ -1,4 +1,5 @@
-//! The magnetic powder brake: coil, hysteresis, torque build-up, drag, heat, stick-slip. Friction itself is solved in the chain.
+//! The magnetic powder brake: coil, hysteresis, torque build-up, drag, heat, stick-slip. Friction itself is solved in
+//! the chain.
 
 use super::error::{PlantError, in_range};
 use super::hysteresis::{Branches, Hysteresis};
@@ -92,14 +93,14 @@ impl BrakeSpec {
     fn branches(&self) -> Branches {
         Branches {
             rated_torque_nm: self.rated_torque_nm,
-            rated_current_a: self.rated_current_a,
+            per_rated_current: 1.0 / self.rated_current_a,
             saturation: self.saturation,
             hysteresis: self.hysteresis,
         }
     }
 
-    /// The static curve that a calibration of this brake would give: both branches over the current, drag included, as torque on
-    /// the driven shaft.
+    /// The static curve that a calibration of this brake would give: both branches over the current, drag included, as
+    /// torque on the driven shaft.
     #[must_use]
     pub fn nominal_curve(&self) -> Vec<BrakeCurvePoint> {
         /// Points from zero to one and a half times the rated current.
@@ -110,37 +111,15 @@ impl BrakeSpec {
                 let current_a = 1.5 * self.rated_current_a * f64::from(n) / f64::from(POINTS - 1);
                 let (rising, falling) = branches.at(current_a);
                 let on_shaft = |torque: f64| (torque + self.drag_nm) * self.step_up;
-                BrakeCurvePoint {
-                    current_a,
-                    rising_nm: on_shaft(rising),
-                    falling_nm: on_shaft(falling),
-                }
+                BrakeCurvePoint { current_a, rising_nm: on_shaft(rising), falling_nm: on_shaft(falling) }
             })
             .collect()
     }
 
     pub(super) fn validate(&self) -> Result<(), PlantError> {
-        in_range(
-            "brake.rated_torque_nm",
-            self.rated_torque_nm,
-            "N·m",
-            (0.0, 1e4),
-            "at the brake's shaft",
-        )?;
-        in_range(
-            "brake.rated_current_a",
-            self.rated_current_a,
-            "A",
-            (1e-3, 100.0),
-            "of the coil",
-        )?;
-        in_range(
-            "brake.saturation",
-            self.saturation,
-            "",
-            (0.05, 100.0),
-            "0.8 is a usual shape",
-        )?;
+        in_range("brake.rated_torque_nm", self.rated_torque_nm, "N·m", (0.0, 1e4), "at the brake's shaft")?;
+        in_range("brake.rated_current_a", self.rated_current_a, "A", (1e-3, 100.0), "of the coil")?;
+        in_range("brake.saturation", self.saturation, "", (0.05, 100.0), "0.8 is a usual shape")?;
         in_range(
             "brake.hysteresis",
             self.hysteresis,
@@ -148,56 +127,14 @@ impl BrakeSpec {
             (0.0, 0.3),
             "half distance of the branches in parts of their mean",
         )?;
-        in_range(
-            "brake.drag_nm",
-            self.drag_nm,
-            "N·m",
-            (0.0, 100.0),
-            "at the brake's shaft",
-        )?;
-        in_range(
-            "brake.coil_resistance_ohm",
-            self.coil_resistance_ohm,
-            "Ω",
-            (0.01, 1e4),
-            "of the coil",
-        )?;
+        in_range("brake.drag_nm", self.drag_nm, "N·m", (0.0, 100.0), "at the brake's shaft")?;
+        in_range("brake.coil_resistance_ohm", self.coil_resistance_ohm, "Ω", (0.01, 1e4), "of the coil")?;
         let usual = (1e-4, 60.0);
-        in_range(
-            "brake.current_time_constant_s",
-            self.current_time_constant_s,
-            "s",
-            usual,
-            "0.06 to 0.56 s is usual",
-        )?;
-        in_range(
-            "brake.torque_time_constant_s",
-            self.torque_time_constant_s,
-            "s",
-            usual,
-            "0.2 to 1.4 s is usual",
-        )?;
-        in_range(
-            "brake.step_up",
-            self.step_up,
-            "",
-            (0.1, 100.0),
-            "brake turns per driven turn",
-        )?;
-        in_range(
-            "brake.rotor_inertia_kg_m2",
-            self.rotor_inertia_kg_m2,
-            "kg·m²",
-            (1e-5, 10.0),
-            "at its own shaft",
-        )?;
-        in_range(
-            "brake.stick_slip_ratio",
-            self.stick_slip_ratio,
-            "",
-            (0.0, 0.5),
-            "0 switches stick-slip off",
-        )?;
+        in_range("brake.current_time_constant_s", self.current_time_constant_s, "s", usual, "0.06 to 0.56 s is usual")?;
+        in_range("brake.torque_time_constant_s", self.torque_time_constant_s, "s", usual, "0.2 to 1.4 s is usual")?;
+        in_range("brake.step_up", self.step_up, "", (0.1, 100.0), "brake turns per driven turn")?;
+        in_range("brake.rotor_inertia_kg_m2", self.rotor_inertia_kg_m2, "kg·m²", (1e-5, 10.0), "at its own shaft")?;
+        in_range("brake.stick_slip_ratio", self.stick_slip_ratio, "", (0.0, 0.5), "0 switches stick-slip off")?;
         in_range(
             "brake.stick_slip_angle_rad",
             self.stick_slip_angle_rad,
@@ -205,28 +142,10 @@ impl BrakeSpec {
             (1e-4, 10.0),
             "slip angle of a build-up",
         )?;
-        in_range(
-            "brake.ambient_c",
-            self.ambient_c,
-            "°C",
-            (-50.0, 100.0),
-            "give degrees Celsius",
-        )?;
+        in_range("brake.ambient_c", self.ambient_c, "°C", (-50.0, 100.0), "give degrees Celsius")?;
         let capacity = (10.0, 1e7);
-        in_range(
-            "brake.powder_capacity_j_per_k",
-            self.powder_capacity_j_per_k,
-            "J/K",
-            capacity,
-            "powder and rotor",
-        )?;
-        in_range(
-            "brake.housing_capacity_j_per_k",
-            self.housing_capacity_j_per_k,
-            "J/K",
-            capacity,
-            "housing",
-        )?;
+        in_range("brake.powder_capacity_j_per_k", self.powder_capacity_j_per_k, "J/K", capacity, "powder and rotor")?;
+        in_range("brake.housing_capacity_j_per_k", self.housing_capacity_j_per_k, "J/K", capacity, "housing")?;
         let resistance = (1e-2, 1e3);
         in_range(
             "brake.inner_resistance_k_per_w",
@@ -242,13 +161,7 @@ impl BrakeSpec {
             resistance,
             "housing to ambient",
         )?;
-        in_range(
-            "brake.fading_per_k",
-            self.fading_per_k,
-            "1/K",
-            (0.0, 0.01),
-            "0 switches fading off",
-        )
+        in_range("brake.fading_per_k", self.fading_per_k, "1/K", (0.0, 0.01), "0 switches fading off")
     }
 }
 
@@ -256,9 +169,8 @@ impl BrakeSpec {
 #[derive(Debug, Clone)]
 pub(super) struct Brake {
     spec: BrakeSpec,
-    enabled: bool,
-    current_limit_a: f64,
-    voltage_limit_v: f64,
+    /// Current that the source's limits allow in the long run, A.
+    target_a: f64,
     current_a: f64,
     torque_nm: f64,
     hysteresis: Hysteresis,
@@ -276,9 +188,7 @@ pub(super) struct Brake {
 impl Brake {
     pub fn new(spec: &BrakeSpec, rng: Pcg64Mcg) -> Self {
         Self {
-            enabled: false,
-            current_limit_a: 0.0,
-            voltage_limit_v: 0.0,
+            target_a: 0.0,
             current_a: 0.0,
             torque_nm: 0.0,
             hysteresis: Hysteresis::new(spec.branches()),
@@ -308,17 +218,13 @@ impl Brake {
     }
 
     pub fn set_drive(&mut self, enabled: bool, current_limit_a: f64, voltage_limit_v: f64) {
-        self.enabled = enabled;
         // A limit that is no number, or negative, gives no current.
-        let valid = |limit: f64| {
-            if limit.is_finite() {
-                limit.max(0.0)
-            } else {
-                0.0
-            }
+        let valid = |limit: f64| if limit.is_finite() { limit.max(0.0) } else { 0.0 };
+        self.target_a = if enabled {
+            valid(current_limit_a).min(valid(voltage_limit_v) / self.spec.coil_resistance_ohm)
+        } else {
+            0.0
         };
-        self.current_limit_a = valid(current_limit_a);
-        self.voltage_limit_v = valid(voltage_limit_v);
     }
 
     pub fn current_a(&self) -> f64 {
@@ -327,7 +233,7 @@ impl Brake {
 
     /// Voltage across the coil: the steady drop of the current that the limits allow (the coil lags behind it).
     pub fn voltage_v(&self) -> f64 {
-        self.target_a() * self.spec.coil_resistance_ohm
+        self.target_a * self.spec.coil_resistance_ohm
     }
 
     /// Temperature of the housing, °C.
@@ -340,26 +246,15 @@ impl Brake {
         self.spec.ambient_c + self.powder_k
     }
 
-    fn target_a(&self) -> f64 {
-        if self.enabled {
-            self.current_limit_a
-                .min(self.voltage_limit_v / self.spec.coil_resistance_ohm)
-        } else {
-            0.0
-        }
-    }
-
     /// Friction torque available on the driven shaft in the next step, N·m, at the speed of the driven shaft.
     #[inline]
     pub fn capacity_nm(&mut self, shaft_rad_per_s: f64) -> f64 {
         // di/dt = (V/R − i)/τ_i and dT/dt = (T_static(i) − T)/τ_T, exact over the step for a steady right-hand side.
-        self.current_a += self.current_step * (self.target_a() - self.current_a);
+        self.current_a += self.current_step * (self.target_a - self.current_a);
         let fixed_nm = self.hysteresis.torque_nm(self.current_a);
         self.torque_nm += self.torque_step * (fixed_nm - self.torque_nm);
         let slip_rad_per_s = shaft_rad_per_s.abs() * self.spec.step_up;
-        let deviation = self
-            .stick_slip
-            .deviation(slip_rad_per_s * self.dt_s, slip_rad_per_s);
+        let deviation = self.stick_slip.deviation(slip_rad_per_s * self.dt_s, slip_rad_per_s);
         (self.torque_nm * self.fading * (1.0 + deviation) + self.spec.drag_nm) * self.spec.step_up
     }
 
@@ -438,10 +333,7 @@ mod tests {
 
     #[test]
     fn current_and_torque_have_their_time_constants() {
-        let mut brake = brake(&BrakeSpec {
-            stick_slip_ratio: 0.0,
-            ..BrakeSpec::default()
-        });
+        let mut brake = brake(&BrakeSpec { stick_slip_ratio: 0.0, ..BrakeSpec::default() });
         brake.set_drive(true, 1.0, 60.0);
         settle(&mut brake, 2.0, 0.1);
         assert!((brake.current_a() - (1.0 - (-1.0f64).exp())).abs() < 1e-6);
@@ -449,27 +341,16 @@ mod tests {
 
     #[test]
     fn slip_power_warms_the_housing_to_its_steady_temperature() {
-        let mut brake = brake(&BrakeSpec {
-            rated_torque_nm: 0.0,
-            drag_nm: 10.0,
-            ..BrakeSpec::default()
-        });
+        let mut brake = brake(&BrakeSpec { rated_torque_nm: 0.0, drag_nm: 10.0, ..BrakeSpec::default() });
         // 10 N·m at 10 rad/s are 100 W over 0.25 K/W, and 0.1 K/W more to the powder.
         settle(&mut brake, 10.0, 8000.0);
-        assert!(
-            (brake.temperature_c() - 47.0).abs() < 0.1,
-            "{}",
-            brake.temperature_c()
-        );
+        assert!((brake.temperature_c() - 47.0).abs() < 0.1, "{}", brake.temperature_c());
         assert!((brake.powder_temperature_c() - 57.0).abs() < 0.1);
     }
 
     #[test]
     fn a_step_up_multiplies_slip_and_torque_on_the_shaft() {
-        let geared = BrakeSpec {
-            step_up: 4.0,
-            ..BrakeSpec::default()
-        };
+        let geared = BrakeSpec { step_up: 4.0, ..BrakeSpec::default() };
         assert!((geared.nominal_curve()[0].rising_nm - 1.2).abs() < 1e-12);
         let mut brake = brake(&geared);
         brake.set_drive(true, 0.5, 60.0);
@@ -481,11 +362,7 @@ mod tests {
 
     #[test]
     fn fading_lowers_the_torque_when_asked_for() {
-        let spec = BrakeSpec {
-            fading_per_k: 0.002,
-            stick_slip_ratio: 0.0,
-            ..BrakeSpec::default()
-        };
+        let spec = BrakeSpec { fading_per_k: 0.002, stick_slip_ratio: 0.0, ..BrakeSpec::default() };
         let mut brake = brake(&spec);
         brake.set_drive(true, 1.0, 60.0);
         let cold = settle(&mut brake, 10.0, 3.0);

@@ -46,13 +46,7 @@ impl EncoderSpec {
     }
 
     fn validate(&self) -> Result<(), PlantError> {
-        in_range(
-            "encoders.lines",
-            f64::from(self.lines),
-            "lines",
-            (1.0, 1e6),
-            "lines of the disc",
-        )?;
+        in_range("encoders.lines", f64::from(self.lines), "lines", (1.0, 1e6), "lines of the disc")?;
         in_range(
             "encoders.counts_per_line",
             f64::from(self.counts_per_line),
@@ -61,42 +55,12 @@ impl EncoderSpec {
             "after interpolation",
         )?;
         let size = (-0.1, 0.1);
-        in_range(
-            "encoders.eccentricity",
-            self.eccentricity,
-            "",
-            size,
-            "in parts of the track's radius",
-        )?;
-        in_range(
-            "encoders.ellipticity",
-            self.ellipticity,
-            "",
-            size,
-            "(b − a)/(b + a) of the half axes",
-        )?;
+        in_range("encoders.eccentricity", self.eccentricity, "", size, "in parts of the track's radius")?;
+        in_range("encoders.ellipticity", self.ellipticity, "", size, "(b − a)/(b + a) of the half axes")?;
         let phase = (-1e6, 1e6);
-        in_range(
-            "encoders.eccentricity_phase_rad",
-            self.eccentricity_phase_rad,
-            "rad",
-            phase,
-            "give a finite angle",
-        )?;
-        in_range(
-            "encoders.ellipticity_phase_rad",
-            self.ellipticity_phase_rad,
-            "rad",
-            phase,
-            "give a finite angle",
-        )?;
-        in_range(
-            "encoders.noise_rad",
-            self.noise_rad,
-            "rad",
-            (0.0, 0.01),
-            "RMS of one reading",
-        )
+        in_range("encoders.eccentricity_phase_rad", self.eccentricity_phase_rad, "rad", phase, "give a finite angle")?;
+        in_range("encoders.ellipticity_phase_rad", self.ellipticity_phase_rad, "rad", phase, "give a finite angle")?;
+        in_range("encoders.noise_rad", self.noise_rad, "rad", (0.0, 0.01), "RMS of one reading")
     }
 }
 
@@ -128,10 +92,7 @@ impl Default for EncodersSpec {
             input: EncoderSpec::with_noise(3e-6),
             output: EncoderSpec::with_noise(4e-6),
             time_skew_s: 0.0,
-            output_count_loss: CountLossSpec {
-                counts: 0,
-                losses_per_rev: 0.0,
-            },
+            output_count_loss: CountLossSpec { counts: 0, losses_per_rev: 0.0 },
         }
     }
 }
@@ -140,13 +101,7 @@ impl EncodersSpec {
     pub(super) fn validate(&self) -> Result<(), PlantError> {
         self.input.validate()?;
         self.output.validate()?;
-        in_range(
-            "encoders.time_skew_s",
-            self.time_skew_s,
-            "s",
-            (-0.01, 0.01),
-            "keep it within ±10 ms",
-        )?;
+        in_range("encoders.time_skew_s", self.time_skew_s, "s", (-0.01, 0.01), "keep it within ±10 ms")?;
         let loss = &self.output_count_loss;
         in_range(
             "encoders.output_count_loss.counts",
@@ -155,17 +110,12 @@ impl EncodersSpec {
             (-1e6, 1e6),
             "counts lost each time",
         )?;
-        in_range(
-            "encoders.output_count_loss.losses_per_rev",
-            loss.losses_per_rev,
-            "1/rev",
-            (0.0, 1e3),
-            "a mean rate",
-        )
+        in_range("encoders.output_count_loss.losses_per_rev", loss.losses_per_rev, "1/rev", (0.0, 1e3), "a mean rate")
     }
 }
 
-/// θ + ψ with tan ψ = ε sin w/(1 − ε cos w): the exact reading of a disc that is displaced (w once a turn) or squeezed (w twice).
+/// θ + ψ with tan ψ = ε sin w/(1 − ε cos w): the exact reading of a disc that is displaced (w once a turn) or squeezed
+/// (w twice).
 #[inline]
 pub(super) fn distorted(theta: f64, epsilon: f64, w: f64) -> f64 {
     let (sin, cos) = w.sin_cos();
@@ -177,6 +127,7 @@ pub(super) fn distorted(theta: f64, epsilon: f64, w: f64) -> f64 {
 pub(super) struct Encoder {
     counts_per_rev: f64,
     counts_per_rad: f64,
+    revs_per_count: f64,
     noise_counts: f64,
     eccentricity: (f64, f64),
     ellipticity: (f64, f64),
@@ -195,6 +146,7 @@ impl Encoder {
         let mut encoder = Self {
             counts_per_rev,
             counts_per_rad: counts_per_rev / TAU,
+            revs_per_count: 1.0 / counts_per_rev,
             noise_counts: spec.noise_rad * counts_per_rev / TAU,
             eccentricity: (spec.eccentricity, spec.eccentricity_phase_rad),
             ellipticity: (spec.ellipticity, spec.ellipticity_phase_rad),
@@ -206,14 +158,15 @@ impl Encoder {
         };
         let scale = encoder.scale_rad(shaft_rad) * encoder.counts_per_rad;
         encoder.offset = floor(scale + 0.5) as i64;
-        encoder.turn = floor(scale / counts_per_rev) as i64;
+        encoder.turn = floor(scale * encoder.revs_per_count) as i64;
         encoder
     }
 
     /// Angle on the disc's scale under the reading head, rad.
     ///
-    /// Displaced disc: with its centre at ε (in track radii) in the direction w = θ − phase from the head's, the head sees the
-    /// scale at θ + atan2(ε sin w, 1 − ε cos w). Squeezed disc: tan turns by (1 + ε)/(1 − ε), the same form in twice the angle.
+    /// Displaced disc: with its centre at ε (in track radii) in the direction w = θ − phase from the head's, the head
+    /// sees the scale at θ + atan2(ε sin w, 1 − ε cos w). Squeezed disc: tan turns by (1 + ε)/(1 − ε), the same form in
+    /// twice the angle.
     #[inline]
     fn scale_rad(&self, shaft_rad: f64) -> f64 {
         if self.exact_disc {
@@ -228,12 +181,12 @@ impl Encoder {
 
     /// Counter value with the shaft at `shaft_rad`; latches the index on the way.
     ///
-    /// The index pulse stands on the middle of count 0 of the scale, so counts less the latched value round to the angle without
-    /// bias.
+    /// The index pulse stands on the middle of count 0 of the scale, so counts less the latched value round to the
+    /// angle without bias.
     #[inline]
     pub fn read(&mut self, shaft_rad: f64) -> i64 {
         let scale = self.scale_rad(shaft_rad) * self.counts_per_rad;
-        let turn = floor(scale / self.counts_per_rev) as i64;
+        let turn = floor(scale * self.revs_per_count) as i64;
         if turn != self.turn {
             let passed = turn.max(self.turn);
             self.index_counts = Some(passed * self.counts_per_rev as i64 - self.offset);
@@ -295,19 +248,15 @@ mod tests {
     #[test]
     fn an_eccentric_disc_reads_what_its_geometry_says() {
         let (epsilon, phase) = (0.02, 0.7);
-        let encoder = encoder(
-            |spec| (spec.eccentricity, spec.eccentricity_phase_rad) = (epsilon, phase),
-            0.0,
-        );
+        let encoder = encoder(|spec| (spec.eccentricity, spec.eccentricity_phase_rad) = (epsilon, phase), 0.0);
         for n in 0..50 {
             let theta = f64::from(n) * 0.21;
-            // Independent construction: where does the ray from the displaced centre to the head at (1, 0) cut the scale?
+            // Independent construction: where does the ray from the displaced centre to the head at (1, 0) cut the
+            // scale?
             let w = theta - phase;
             let (x, y) = (1.0 - epsilon * w.cos(), -epsilon * w.sin());
             assert!((encoder.scale_rad(theta) - (theta - y.atan2(x))).abs() < 1e-14);
-            assert!(
-                (encoder.scale_rad(theta) - theta - epsilon * w.sin()).abs() < epsilon * epsilon
-            );
+            assert!((encoder.scale_rad(theta) - theta - epsilon * w.sin()).abs() < epsilon * epsilon);
         }
     }
 
@@ -325,9 +274,7 @@ mod tests {
     #[test]
     fn noise_has_the_size_asked_for() {
         let mut noisy = encoder(|spec| spec.noise_rad = 4e-6, 0.0);
-        let values: Vec<f64> = (0..50_000)
-            .map(|_| noisy.read(1.0) as f64 * TAU / 7.2e6 - 1.0)
-            .collect();
+        let values: Vec<f64> = (0..50_000).map(|_| noisy.read(1.0) as f64 * TAU / 7.2e6 - 1.0).collect();
         let rms = (values.iter().map(|v| v * v).sum::<f64>() / 5e4).sqrt();
         let with_rounding = (4e-6f64.powi(2) + (TAU / 7.2e6).powi(2) / 12.0).sqrt();
         assert!((rms / with_rounding - 1.0).abs() < 0.02, "{rms}");

@@ -4,9 +4,7 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// A parameter lies outside the range in which the plant is meaningful.
-    #[error(
-        "simulated plant: {quantity} is {value} {unit}, allowed is {min} to {max} {unit}: {hint}"
-    )]
+    #[error("simulated plant: {quantity} is {value} {unit}, allowed is {min} to {max} {unit}: {hint}")]
     OutOfRange {
         /// The parameter, by its name in the specification.
         quantity: &'static str,
@@ -92,14 +90,7 @@ pub(super) fn in_range(
     if (min..=max).contains(&value) {
         Ok(())
     } else {
-        Err(PlantError::OutOfRange {
-            quantity,
-            value,
-            unit,
-            min,
-            max,
-            hint,
-        })
+        Err(PlantError::OutOfRange { quantity, value, unit, min, max, hint })
     }
 }
 
@@ -109,14 +100,7 @@ mod tests {
 
     #[test]
     fn a_range_error_says_what_where_and_what_next() {
-        let error = in_range(
-            "gears.e1_mm",
-            7.0,
-            "mm",
-            (0.0, 1.0),
-            "give the eccentricity in mm",
-        )
-        .unwrap_err();
+        let error = in_range("gears.e1_mm", 7.0, "mm", (0.0, 1.0), "give the eccentricity in mm").unwrap_err();
         assert_eq!(
             error.to_string(),
             "simulated plant: gears.e1_mm is 7 mm, allowed is 0 to 1 mm: give the eccentricity in mm"

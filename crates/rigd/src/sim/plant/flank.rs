@@ -1,13 +1,15 @@
 //! Exact contact of rack-generated flanks under rigid displacements of both gears.
 //!
-//! A rack that rolls along both pitch curves cuts conjugate flanks. At rolling parameter θ, with pitch point P = (r1, 0), unit
-//! tangent T = (−sin μ, cos μ), normal N = (cos μ, sin μ) and the rack flank at the distance d from P along T, the cut point is
-//! Q = P ± (d cos α) n on the flank normal n = ± cos α T + sin α N (upper sign: ccw flank). Turned back by θ about the driver's
-//! axis Q traces gear 1's flank, by f(θ) about the driven axis gear 2's. Both gears displaced, a driver angle θ1 leaves three
-//! unknowns (θ_a, θ_b, ψ2) and three equations: the points coincide, and so do the normals. Newton's method solves them.
+//! A rack that rolls along both pitch curves cuts conjugate flanks. At rolling parameter θ, with pitch point P = (r1,
+//! 0), unit tangent T = (−sin μ, cos μ), normal N = (cos μ, sin μ) and the rack flank at the distance d from P along T,
+//! the cut point is Q = P ± (d cos α) n on the flank normal n = ± cos α T + sin α N (upper sign: ccw flank). Turned
+//! back by θ about the driver's axis Q traces gear 1's flank, by f(θ) about the driven axis gear 2's. Both gears
+//! displaced, a driver angle θ1 leaves three unknowns (θ_a, θ_b, ψ2) and three equations: the points coincide, and so
+//! do the normals. Newton's method solves them.
 //!
-//! Rigid displacements move every tooth pair of a flank alike (flanks of neighbouring teeth are equidistant), so it is enough to
-//! follow the pair whose rack flank passes the pitch point at θ1 itself; a test holds another pair against it.
+//! Rigid displacements move every tooth pair of a flank alike (flanks of neighbouring teeth are equidistant), so it is
+//! enough to follow the pair whose rack flank passes the pitch point at θ1 itself; a test holds another pair against
+//! it.
 
 use super::error::PlantError;
 use super::geometry::{GearSpec, PitchCurves};
@@ -133,20 +135,15 @@ impl MountedPair {
         }
     }
 
-    /// Contact at driver angle `theta1` on `flank`, of the tooth pair whose rack flank is `offset_mm` away from the pitch point.
-    pub fn contact(
-        &self,
-        flank: Flank,
-        theta1: f64,
-        offset_mm: f64,
-    ) -> Result<Contact, PlantError> {
+    /// Contact at driver angle `theta1` on `flank`, of the tooth pair whose rack flank is `offset_mm` away from the
+    /// pitch point.
+    pub fn contact(&self, flank: Flank, theta1: f64, offset_mm: f64) -> Result<Contact, PlantError> {
         let nominal = self.curves.driven_angle(theta1);
         let (mut a, mut b, mut psi) = (theta1, theta1, nominal);
         let mut last = f64::INFINITY;
         for _ in 0..30 {
             let system = self.system(flank, theta1, offset_mm, a, b, psi);
-            let Some([da, db, dpsi]) = solve3(&system.jacobian, &system.residual.map(|r| -r))
-            else {
+            let Some([da, db, dpsi]) = solve3(&system.jacobian, &system.residual.map(|r| -r)) else {
                 break;
             };
             (a, b, psi) = (a + da, b + db, psi + dpsi);
@@ -157,15 +154,10 @@ impl MountedPair {
             if last < CONVERGED_RAD {
                 let system = self.system(flank, theta1, offset_mm, a, b, psi);
                 // Implicit function theorem: J d(a, b, ψ)/dθ1 = −∂F/∂θ1.
-                let Some([_, _, ratio]) = solve3(&system.jacobian, &system.over_theta1.map(|r| -r))
-                else {
+                let Some([_, _, ratio]) = solve3(&system.jacobian, &system.over_theta1.map(|r| -r)) else {
                     break;
                 };
-                return Ok(Contact {
-                    psi2_rad: psi,
-                    ratio,
-                    arm2_mm: system.arm2_mm,
-                });
+                return Ok(Contact { psi2_rad: psi, ratio, arm2_mm: system.arm2_mm });
             }
         }
         Err(PlantError::NoContact {
@@ -176,15 +168,7 @@ impl MountedPair {
         })
     }
 
-    fn system(
-        &self,
-        flank: Flank,
-        theta1: f64,
-        offset_mm: f64,
-        a: f64,
-        b: f64,
-        psi: f64,
-    ) -> System {
+    fn system(&self, flank: Flank, theta1: f64, offset_mm: f64, a: f64, b: f64, psi: f64) -> System {
         let nominal_centre = self.curves.centre_distance_mm;
         // Recessing gear 1's flank moves it against the normal that pushes gear 2, gear 2's flank along it.
         let one = self.cut(flank, a, theta1, offset_mm, -self.recess_mm);
@@ -206,13 +190,7 @@ impl MountedPair {
         let point2 = [self.distance_mm + reach2[0], reach2[1]];
         let f_slope = self.curves.ratio(b);
         let curl = quarter(from_axis);
-        let over_b = rotate(
-            [
-                two.slope[0] + f_slope * curl[0],
-                two.slope[1] + f_slope * curl[1],
-            ],
-            turn2,
-        );
+        let over_b = rotate([two.slope[0] + f_slope * curl[0], two.slope[1] + f_slope * curl[1]], turn2);
         let spin = quarter(arm2);
         let over_psi = [-spin[0] - self.e2_mm * sin_v, -spin[1] - self.e2_mm * cos_v];
 
@@ -222,25 +200,13 @@ impl MountedPair {
         let normal = rotate(one.normal, turn1);
         let spin1 = quarter(arm1);
         System {
-            residual: [
-                point1[0] - point2[0],
-                point1[1] - point2[1],
-                direction1 - direction2,
-            ],
+            residual: [point1[0] - point2[0], point1[1] - point2[1], direction1 - direction2],
             jacobian: [
                 [over_a[0], -over_b[0], -over_psi[0]],
                 [over_a[1], -over_b[1], -over_psi[1]],
-                [
-                    one.inclination_slope - 1.0,
-                    -(two.inclination_slope + f_slope),
-                    1.0,
-                ],
+                [one.inclination_slope - 1.0, -(two.inclination_slope + f_slope), 1.0],
             ],
-            over_theta1: [
-                spin1[0] - self.e1_mm * sin_u,
-                spin1[1] + self.e1_mm * cos_u,
-                1.0,
-            ],
+            over_theta1: [spin1[0] - self.e1_mm * sin_u, spin1[1] + self.e1_mm * cos_u, 1.0],
             arm2_mm: (reach2[0] * normal[1] - reach2[1] * normal[0]).abs(),
         }
     }
@@ -263,9 +229,7 @@ fn solve3(m: &[[f64; 3]; 3], r: &[f64; 3]) -> Option<[f64; 3]> {
     if determinant == 0.0 || !determinant.is_finite() {
         return None;
     }
-    Some(std::array::from_fn(|j| {
-        (0..3).map(|i| minor(i, j) * r[i]).sum::<f64>() / determinant
-    }))
+    Some(std::array::from_fn(|j| (0..3).map(|i| minor(i, j) * r[i]).sum::<f64>() / determinant))
 }
 
 #[cfg(test)]
@@ -274,13 +238,7 @@ mod tests {
     use std::f64::consts::{PI, TAU};
 
     fn mounted(k: f64, e1: f64, e2: f64, backlash: f64) -> MountedPair {
-        let gears = GearSpec {
-            eccentricity: k,
-            e1_mm: e1,
-            e2_mm: e2,
-            backlash_mm: backlash,
-            ..GearSpec::default()
-        };
+        let gears = GearSpec { eccentricity: k, e1_mm: e1, e2_mm: e2, backlash_mm: backlash, ..GearSpec::default() };
         MountedPair::new(&gears, 0.0)
     }
 
@@ -299,8 +257,7 @@ mod tests {
                         assert!((contact.psi2_rad - pair.curves.driven_angle(theta)).abs() < 1e-13);
                         assert!((contact.ratio - pair.curves.ratio(theta)).abs() < 1e-12);
                         let mu = pair.curves.radius(theta).inclination();
-                        let arm = pair.curves.driven_radius(theta)
-                            * (pair.alpha - flank.sign() * mu).cos();
+                        let arm = pair.curves.driven_radius(theta) * (pair.alpha - flank.sign() * mu).cos();
                         assert!((contact.arm2_mm - arm).abs() < 1e-10);
                     }
                 }
@@ -315,11 +272,7 @@ mod tests {
             for flank in [Flank::Ccw, Flank::Cw] {
                 let here = pair.contact(flank, theta, 0.0).unwrap();
                 let other = pair.contact(flank, theta, PI * 3.0 / 2.0).unwrap();
-                assert!(
-                    (here.psi2_rad - other.psi2_rad).abs() < 1e-12,
-                    "{} at {theta}",
-                    flank.name()
-                );
+                assert!((here.psi2_rad - other.psi2_rad).abs() < 1e-12, "{} at {theta}", flank.name());
                 assert!((here.arm2_mm - other.arm2_mm).abs() < 1e-9);
             }
         }
@@ -337,8 +290,9 @@ mod tests {
         }
     }
 
-    /// Eccentric involute gears in closed form: with γ the direction of the line between the displaced base-circle centres and
-    /// cos α' = (rb1 + rb2)/distance, rb1 θ1 − rb2 ψ2 = (rb1 + rb2)(γ ± inv α') + const (upper sign: ccw flank).
+    /// Eccentric involute gears in closed form: with γ the direction of the line between the displaced base-circle
+    /// centres and cos α' = (rb1 + rb2)/distance, rb1 θ1 − rb2 ψ2 = (rb1 + rb2)(γ ± inv α') + const (upper sign: ccw
+    /// flank).
     #[test]
     fn circular_gears_follow_the_closed_form_of_eccentric_involutes() {
         let pair = mounted(0.0, 0.05, 0.03, 0.15);
@@ -356,12 +310,7 @@ mod tests {
                 })
                 .collect();
             for value in &constants {
-                assert!(
-                    (value - constants[0]).abs() < 1e-11,
-                    "{} {}",
-                    flank.name(),
-                    value - constants[0]
-                );
+                assert!((value - constants[0]).abs() < 1e-11, "{} {}", flank.name(), value - constants[0]);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Pitch curves of the simulated pair: an ellipse about its focus, or circles.
 //!
-//! Angles in rad, lengths in mm. The driver sits at the origin, the driven gear at (a, 0); the driven angle counts positive in
-//! its own sense of motion, so the transmission function increases.
+//! Angles in rad, lengths in mm. The driver sits at the origin, the driven gear at (a, 0); the driven angle counts
+//! positive in its own sense of motion, so the transmission function increases.
 
 use super::error::{PlantError, in_range};
 
@@ -37,7 +37,8 @@ impl Default for GearSpec {
             teeth: [47, 47],
             eccentricity: 0.3287,
             pressure_angle_deg: 20.0,
-            // The documented eccentricities alone close the gap by up to 0.04 mm along the pitch curve; 0.15 mm keeps it open.
+            // The documented eccentricities alone close the gap by up to 0.04 mm along the pitch curve; 0.15 mm keeps
+            // it open.
             backlash_mm: 0.15,
             e1_mm: 0.05,
             phi1_rad: 0.3,
@@ -52,13 +53,7 @@ impl GearSpec {
     /// A pair without any error and without backlash.
     #[must_use]
     pub fn ideal(self) -> Self {
-        Self {
-            backlash_mm: 0.0,
-            e1_mm: 0.0,
-            e2_mm: 0.0,
-            centre_distance_error_mm: 0.0,
-            ..self
-        }
+        Self { backlash_mm: 0.0, e1_mm: 0.0, e2_mm: 0.0, centre_distance_error_mm: 0.0, ..self }
     }
 
     /// Adds the vector (dx, dy), mm, to the eccentricity of gear 1.
@@ -73,21 +68,9 @@ impl GearSpec {
 
     pub(super) fn validate(&self) -> Result<(), PlantError> {
         let m = self.module_mm;
-        in_range(
-            "gears.module_mm",
-            m,
-            "mm",
-            (0.05, 100.0),
-            "give the module in mm",
-        )?;
+        in_range("gears.module_mm", m, "mm", (0.05, 100.0), "give the module in mm")?;
         for teeth in self.teeth {
-            in_range(
-                "gears.teeth",
-                f64::from(teeth),
-                "teeth",
-                (8.0, 250.0),
-                "use a real tooth number",
-            )?;
+            in_range("gears.teeth", f64::from(teeth), "teeth", (8.0, 250.0), "use a real tooth number")?;
         }
         in_range(
             "gears.eccentricity",
@@ -96,13 +79,7 @@ impl GearSpec {
             (0.0, 0.8),
             "k = 0 is circular; above 0.8 teeth cannot be cut",
         )?;
-        in_range(
-            "gears.pressure_angle_deg",
-            self.pressure_angle_deg,
-            "deg",
-            (5.0, 45.0),
-            "20 is usual",
-        )?;
+        in_range("gears.pressure_angle_deg", self.pressure_angle_deg, "deg", (5.0, 45.0), "20 is usual")?;
         in_range(
             "gears.backlash_mm",
             self.backlash_mm,
@@ -110,20 +87,8 @@ impl GearSpec {
             (0.0, 0.5 * m),
             "give the thinning in mm, well under a module",
         )?;
-        in_range(
-            "gears.e1_mm",
-            self.e1_mm,
-            "mm",
-            (0.0, 0.5 * m),
-            "give the eccentricity in mm, well under a module",
-        )?;
-        in_range(
-            "gears.e2_mm",
-            self.e2_mm,
-            "mm",
-            (0.0, 0.5 * m),
-            "give the eccentricity in mm, well under a module",
-        )?;
+        in_range("gears.e1_mm", self.e1_mm, "mm", (0.0, 0.5 * m), "give the eccentricity in mm, well under a module")?;
+        in_range("gears.e2_mm", self.e2_mm, "mm", (0.0, 0.5 * m), "give the eccentricity in mm, well under a module")?;
         let limits = (-0.5 * m, 0.5 * m);
         in_range(
             "gears.centre_distance_error_mm",
@@ -133,20 +98,8 @@ impl GearSpec {
             "stay well under a module",
         )?;
         let finite = (-1e6, 1e6);
-        in_range(
-            "gears.phi1_rad",
-            self.phi1_rad,
-            "rad",
-            finite,
-            "give a finite angle",
-        )?;
-        in_range(
-            "gears.phi2_rad",
-            self.phi2_rad,
-            "rad",
-            finite,
-            "give a finite angle",
-        )?;
+        in_range("gears.phi1_rad", self.phi1_rad, "rad", finite, "give a finite angle")?;
+        in_range("gears.phi2_rad", self.phi2_rad, "rad", finite, "give a finite angle")?;
         if self.eccentricity > 0.0 && self.teeth[0] != self.teeth[1] {
             return Err(PlantError::UnequalTeeth {
                 eccentricity: self.eccentricity,
@@ -216,7 +169,8 @@ impl PitchCurves {
                 turns_per_period: z2 / greatest_common_divisor(z1, z2),
             }
         } else {
-            // Tooth condition: perimeter 4 A E(k) = π m Z fixes the semi-major axis A; each gear turns about a focus, a = 2A.
+            // Tooth condition: perimeter 4 A E(k) = π m Z fixes the semi-major axis A; each gear turns about a focus, a
+            // = 2A.
             let perimeter_mm = std::f64::consts::PI * gears.module_mm * f64::from(z1);
             let semi_major_mm = perimeter_mm / (4.0 * complete_elliptic_e(k));
             Self {
@@ -242,8 +196,8 @@ impl PitchCurves {
 
     /// Nominal driven angle f(θ1), rad.
     ///
-    /// tan(f/2) = (1+k)/(1−k) tan(θ1/2); the difference f − θ1 of that Moebius map is 2 atan(k sin θ1/(1 − k cos θ1)), which
-    /// needs no unwrapping.
+    /// tan(f/2) = (1+k)/(1−k) tan(θ1/2); the difference f − θ1 of that Moebius map is 2 atan(k sin θ1/(1 − k cos θ1)),
+    /// which needs no unwrapping.
     pub fn driven_angle(&self, theta1: f64) -> f64 {
         if self.k == 0.0 {
             return self.mean_ratio * theta1;
@@ -263,7 +217,8 @@ impl PitchCurves {
         self.centre_distance_mm - self.radius(theta1).r
     }
 
-    /// Pitch arc from `from` to `to`, mm, by five-point Gauss–Legendre quadrature; meant for arcs up to a few tooth pitches.
+    /// Pitch arc from `from` to `to`, mm, by five-point Gauss–Legendre quadrature; meant for arcs up to a few tooth
+    /// pitches.
     pub fn arc_mm(&self, from: f64, to: f64) -> f64 {
         const NODES: [(f64, f64); 3] = [
             (0.0, 0.568_888_888_888_888_9),
@@ -281,11 +236,7 @@ impl PitchCurves {
 }
 
 fn greatest_common_divisor(a: u32, b: u32) -> u32 {
-    if b == 0 {
-        a
-    } else {
-        greatest_common_divisor(b, a % b)
-    }
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
 /// Complete elliptic integral of the second kind E(k) by the arithmetic–geometric mean:
@@ -310,21 +261,14 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn pair(k: f64) -> PitchCurves {
-        PitchCurves::new(&GearSpec {
-            eccentricity: k,
-            ..GearSpec::default()
-        })
+        PitchCurves::new(&GearSpec { eccentricity: k, ..GearSpec::default() })
     }
 
     #[test]
     fn the_tooth_condition_fixes_the_documented_centre_distances() {
-        for (k, a_mm) in [
-            (0.0, 141.0),
-            (0.2, 142.435_217),
-            (0.3287, 144.999_717),
-            (0.4, 147.072_290),
-            (0.6, 156.184_243),
-        ] {
+        for (k, a_mm) in
+            [(0.0, 141.0), (0.2, 142.435_217), (0.3287, 144.999_717), (0.4, 147.072_290), (0.6, 156.184_243)]
+        {
             assert!((pair(k).centre_distance_mm - a_mm).abs() < 1e-6, "k = {k}");
         }
     }
@@ -335,12 +279,8 @@ mod tests {
             let curves = pair(k);
             for n in 0..64 {
                 let theta = f64::from(n) * 0.1;
-                let slope =
-                    (curves.driven_angle(theta + 1e-5) - curves.driven_angle(theta - 1e-5)) / 2e-5;
-                assert!(
-                    (slope - curves.ratio(theta)).abs() < 1e-8,
-                    "k = {k}, theta = {theta}"
-                );
+                let slope = (curves.driven_angle(theta + 1e-5) - curves.driven_angle(theta - 1e-5)) / 2e-5;
+                assert!((slope - curves.ratio(theta)).abs() < 1e-8, "k = {k}, theta = {theta}");
             }
             assert!((curves.driven_angle(TAU) - TAU).abs() < 1e-14);
         }
@@ -351,11 +291,7 @@ mod tests {
         let curves = pair(0.5);
         for n in 0..20 {
             let theta = f64::from(n) * 0.33;
-            let (minus, here, plus) = (
-                curves.radius(theta - 1e-4),
-                curves.radius(theta),
-                curves.radius(theta + 1e-4),
-            );
+            let (minus, here, plus) = (curves.radius(theta - 1e-4), curves.radius(theta), curves.radius(theta + 1e-4));
             assert!(((plus.r - minus.r) / 2e-4 - here.dr).abs() < 1e-4);
             assert!(((plus.dr - minus.dr) / 2e-4 - here.ddr).abs() < 1e-4);
             let slope = (plus.inclination() - minus.inclination()) / 2e-4;
@@ -366,26 +302,15 @@ mod tests {
     #[test]
     fn the_arc_of_a_whole_turn_is_the_perimeter() {
         let curves = pair(0.3287);
-        let arcs: f64 = (0..64)
-            .map(|n| curves.arc_mm(f64::from(n) * TAU / 64.0, f64::from(n + 1) * TAU / 64.0))
-            .sum();
+        let arcs: f64 = (0..64).map(|n| curves.arc_mm(f64::from(n) * TAU / 64.0, f64::from(n + 1) * TAU / 64.0)).sum();
         assert!((arcs - std::f64::consts::PI * 3.0 * 47.0).abs() < 1e-10);
     }
 
     #[test]
     fn unequal_teeth_are_for_circular_pairs_only() {
-        let gears = GearSpec {
-            teeth: [47, 31],
-            ..GearSpec::default()
-        };
-        assert!(matches!(
-            gears.validate(),
-            Err(PlantError::UnequalTeeth { .. })
-        ));
-        let circular = GearSpec {
-            eccentricity: 0.0,
-            ..gears
-        };
+        let gears = GearSpec { teeth: [47, 31], ..GearSpec::default() };
+        assert!(matches!(gears.validate(), Err(PlantError::UnequalTeeth { .. })));
+        let circular = GearSpec { eccentricity: 0.0, ..gears };
         assert!(circular.validate().is_ok());
         assert_eq!(PitchCurves::new(&circular).turns_per_period, 31);
     }

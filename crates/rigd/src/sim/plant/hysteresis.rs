@@ -1,18 +1,21 @@
 //! Torque of a powder brake against its current: two branches, and everything between them after a reversal.
 //!
-//! A generalised Prandtl–Ishlinskii operator: three play operators between envelopes of different width. Each play keeps its
-//! torque until an envelope pushes it, `y ← max(rising(i), min(falling(i), y))`; their mean follows the rising branch while the
-//! current grows, the falling branch while it falls, and crosses over gradually after a reversal, with closed minor loops.
-//! (I. Mayergoyz, Mathematical Models of Hysteresis; M. Brokate and J. Sprekels, Hysteresis and Phase Transitions.)
+//! A generalised Prandtl–Ishlinskii operator: three play operators between envelopes of different width. Each play
+//! keeps its torque until an envelope pushes it, `y ← max(rising(i), min(falling(i), y))`; their mean follows the
+//! rising branch while the current grows, the falling branch while it falls, and crosses over gradually after a
+//! reversal, with closed minor loops. (I. Mayergoyz, Mathematical Models of Hysteresis; M. Brokate and J. Sprekels,
+//! Hysteresis and Phase Transitions.)
 
-/// Widths of the plays in parts of the branches' half distance; their mean is 1, so the branches are those of the specification.
+/// Widths of the plays in parts of the branches' half distance; their mean is 1, so the branches are those of the
+/// specification.
 const PLAY_WIDTHS: [f64; 3] = [0.5, 1.0, 1.5];
 
 /// Shape of the two branches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Branches {
     pub rated_torque_nm: f64,
-    pub rated_current_a: f64,
+    /// Reciprocal of the rated current, 1/A.
+    pub per_rated_current: f64,
     /// c in g(x) = (1 + c) x²/(x² + c): small c saturates early.
     pub saturation: f64,
     /// δ: half distance of the branches in parts of their mean, at small current.
@@ -24,11 +27,10 @@ impl Branches {
     #[inline]
     fn mean_and_half_width(&self, current_a: f64) -> (f64, f64) {
         // The branches meet at 1.5 times the rated current; beyond it the powder is saturated.
-        let x = (current_a / self.rated_current_a).clamp(0.0, 1.5);
+        let x = (current_a * self.per_rated_current).clamp(0.0, 1.5);
         let square = x * x;
-        let mean =
-            self.rated_torque_nm * (1.0 + self.saturation) * square / (square + self.saturation);
-        (mean, mean * self.hysteresis * (1.0 - x / 1.5))
+        let mean = self.rated_torque_nm * (1.0 + self.saturation) * square / (square + self.saturation);
+        (mean, mean * self.hysteresis * (1.0 - x * (1.0 / 1.5)))
     }
 
     /// (rising, falling) torque, N·m, without drag.
@@ -47,10 +49,7 @@ pub(super) struct Hysteresis {
 
 impl Hysteresis {
     pub fn new(branches: Branches) -> Self {
-        Self {
-            branches,
-            plays_nm: [0.0; 3],
-        }
+        Self { branches, plays_nm: [0.0; 3] }
     }
 
     /// Static torque at `current_a` after all that went before, N·m, without drag.
@@ -71,12 +70,7 @@ mod tests {
     use super::*;
 
     fn brake() -> Hysteresis {
-        Hysteresis::new(Branches {
-            rated_torque_nm: 25.0,
-            rated_current_a: 1.0,
-            saturation: 0.8,
-            hysteresis: 0.06,
-        })
+        Hysteresis::new(Branches { rated_torque_nm: 25.0, per_rated_current: 1.0, saturation: 0.8, hysteresis: 0.06 })
     }
 
     fn sweep(brake: &mut Hysteresis, from: f64, to: f64) -> f64 {
@@ -121,9 +115,7 @@ mod tests {
     #[test]
     fn both_branches_rise_with_the_current() {
         let branches = brake().branches;
-        let points: Vec<(f64, f64)> = (0..=150)
-            .map(|n| branches.at(f64::from(n) * 0.01))
-            .collect();
+        let points: Vec<(f64, f64)> = (0..=150).map(|n| branches.at(f64::from(n) * 0.01)).collect();
         for pair in points.windows(2) {
             assert!(pair[1].0 > pair[0].0 && pair[1].1 > pair[0].1);
             assert!(pair[0].1 >= pair[0].0);

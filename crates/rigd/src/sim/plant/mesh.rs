@@ -8,10 +8,13 @@ use super::table::{ContactTable, FlankState, Place};
 /// Default compliance of the mesh, mm²·rad/(N·m): 1000/k for k = 5.9e5 N/mm.
 pub const DEFAULT_MESH_COMPLIANCE_MM2_RAD_PER_NM: f64 = 1.7e-3;
 
+/// Teeth without compliance are taken as stiff as this, mm²·rad/(N·m): under 0.5 µrad at 10 N·m.
+const RIGID_MESH_MM2_RAD_PER_NM: f64 = 1e-4;
+
 /// Stiffness and damping of the teeth in contact.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshSpec {
-    /// Compliance of the mesh, mm²·rad/(N·m): 1000/k with the stiffness k along the normal in N/mm.
+    /// Compliance of the mesh, mm²·rad/(N·m): 1000/k with the stiffness k along the normal in N/mm; 0 is rigid.
     pub compliance_mm2_rad_per_nm: f64,
     /// Damping in parts of the stiffness, s; contact never pulls.
     pub damping_time_s: f64,
@@ -19,10 +22,7 @@ pub struct MeshSpec {
 
 impl Default for MeshSpec {
     fn default() -> Self {
-        Self {
-            compliance_mm2_rad_per_nm: DEFAULT_MESH_COMPLIANCE_MM2_RAD_PER_NM,
-            damping_time_s: 8e-6,
-        }
+        Self { compliance_mm2_rad_per_nm: DEFAULT_MESH_COMPLIANCE_MM2_RAD_PER_NM, damping_time_s: 8e-6 }
     }
 }
 
@@ -37,49 +37,22 @@ pub struct HousingSpec {
 
 impl Default for HousingSpec {
     fn default() -> Self {
-        Self {
-            growth_mm: 0.0,
-            time_constant_s: 300.0,
-        }
+        Self { growth_mm: 0.0, time_constant_s: 300.0 }
     }
 }
 
 impl MeshSpec {
     pub(super) fn validate(&self) -> Result<(), PlantError> {
         let compliance = self.compliance_mm2_rad_per_nm;
-        in_range(
-            "mesh.compliance_mm2_rad_per_nm",
-            compliance,
-            "mm²·rad/(N·m)",
-            (1e-5, 10.0),
-            "1000/k with k in N/mm",
-        )?;
-        in_range(
-            "mesh.damping_time_s",
-            self.damping_time_s,
-            "s",
-            (0.0, 1e-3),
-            "damping over stiffness",
-        )
+        in_range("mesh.compliance_mm2_rad_per_nm", compliance, "mm²·rad/(N·m)", (0.0, 10.0), "1000/k with k in N/mm")?;
+        in_range("mesh.damping_time_s", self.damping_time_s, "s", (0.0, 1e-3), "damping over stiffness")
     }
 }
 
 impl HousingSpec {
     pub(super) fn validate(&self) -> Result<(), PlantError> {
-        in_range(
-            "housing.growth_mm",
-            self.growth_mm,
-            "mm",
-            (-1.0, 1.0),
-            "growth of the centre distance when warm",
-        )?;
-        in_range(
-            "housing.time_constant_s",
-            self.time_constant_s,
-            "s",
-            (0.1, 1e6),
-            "of the warming",
-        )
+        in_range("housing.growth_mm", self.growth_mm, "mm", (-1.0, 1.0), "growth of the centre distance when warm")?;
+        in_range("housing.time_constant_s", self.time_constant_s, "s", (0.1, 1e6), "of the warming")
     }
 }
 
@@ -96,11 +69,7 @@ pub(super) struct Mesh {
 }
 
 impl Mesh {
-    pub fn new(
-        gears: &GearSpec,
-        mesh: &MeshSpec,
-        housing: &HousingSpec,
-    ) -> Result<Self, PlantError> {
+    pub fn new(gears: &GearSpec, mesh: &MeshSpec, housing: &HousingSpec) -> Result<Self, PlantError> {
         let growth_mm = housing.growth_mm;
         let mut cold = ContactTable::new(gears, 0.0, 0)?;
         let mut warm = None;
@@ -122,18 +91,14 @@ impl Mesh {
             cold,
             warm,
             weights: [1.0, 0.0, 0.0],
-            stiffness_nm_per_mm2_rad: 1.0 / mesh.compliance_mm2_rad_per_nm,
+            stiffness_nm_per_mm2_rad: 1.0 / mesh.compliance_mm2_rad_per_nm.max(RIGID_MESH_MM2_RAD_PER_NM),
             damping_time_s: mesh.damping_time_s,
         })
     }
 
     /// Sets how warm the housing is: 0 cold, 1 warm.
     pub fn set_warmth(&mut self, x: f64) {
-        self.weights = [
-            (1.0 - x) * (1.0 - 2.0 * x),
-            4.0 * x * (1.0 - x),
-            x * (2.0 * x - 1.0),
-        ];
+        self.weights = [(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)];
     }
 
     #[inline]
@@ -151,11 +116,7 @@ impl Mesh {
         let cold = self.cold.flank(place, flank);
         match &self.warm {
             None => cold,
-            Some(warm) => self.blend(
-                cold,
-                warm[0].flank(place, flank),
-                warm[1].flank(place, flank),
-            ),
+            Some(warm) => self.blend(cold, warm[0].flank(place, flank), warm[1].flank(place, flank)),
         }
     }
 
@@ -175,9 +136,7 @@ impl Mesh {
         FlankState {
             psi_rad: a * cold.psi_rad + b * half.psi_rad + c * warm.psi_rad,
             ratio: a * cold.ratio + b * half.ratio + c * warm.ratio,
-            arm_squared_mm2: a * cold.arm_squared_mm2
-                + b * half.arm_squared_mm2
-                + c * warm.arm_squared_mm2,
+            arm_squared_mm2: a * cold.arm_squared_mm2 + b * half.arm_squared_mm2 + c * warm.arm_squared_mm2,
         }
     }
 }
@@ -190,10 +149,7 @@ mod tests {
     #[test]
     fn a_warming_housing_passes_through_exact_contact() {
         let gears = GearSpec::default();
-        let housing = HousingSpec {
-            growth_mm: 0.06,
-            time_constant_s: 1.0,
-        };
+        let housing = HousingSpec { growth_mm: 0.06, time_constant_s: 1.0 };
         let mut mesh = Mesh::new(&gears, &MeshSpec::default(), &housing).unwrap();
         for x in [0.0, 0.2, 0.5, 0.77, 1.0] {
             mesh.set_warmth(x);

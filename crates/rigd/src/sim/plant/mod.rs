@@ -1,8 +1,8 @@
 //! The simulated rig's mechanics in the time domain: the truth against which measurement and diagnosis are checked.
 //!
-//! Servo with reduction, input shaft, two gears with backlash in exact tooth contact, output shaft, powder brake, two encoders.
-//! It shares no formula with the gear model: contact of the flanks is solved exactly ([`Flank`], displaced rack-generated teeth),
-//! encoder discs and couplings read what their geometry says, and loads wind up real springs.
+//! Servo with reduction, input shaft, two gears with backlash in exact tooth contact, output shaft, powder brake, two
+//! encoders. It shares no formula with the gear model: contact of the flanks is solved exactly ([`Flank`], displaced
+//! rack-generated teeth), encoder discs and couplings read what their geometry says, and loads wind up real springs.
 //!
 //! | part | file |
 //! |---|---|
@@ -47,7 +47,6 @@ pub use run_out::NoiseSpec;
 pub use servo::DriveSpec;
 pub use slippage::ClampSpec;
 pub use spec::{
-    DEFAULT_SHAFT_COMPLIANCE_INPUT_RAD_PER_NM, DEFAULT_SHAFT_COMPLIANCE_OUTPUT_RAD_PER_NM,
-    PlantSpec, ShaftSpec,
+    DEFAULT_SHAFT_COMPLIANCE_INPUT_RAD_PER_NM, DEFAULT_SHAFT_COMPLIANCE_OUTPUT_RAD_PER_NM, PlantSpec, ShaftSpec,
 };
 pub use undocumented::UNDOCUMENTED;

@@ -19,6 +19,8 @@ use std::f64::consts::TAU;
 
 /// The integrator's steps are not longer than this, s.
 const LONGEST_STEP_S: f64 = 100e-6;
+/// A shaft without compliance is taken as stiff as this, rad/(N·m): 0.1 µrad at 10 N·m.
+const RIGID_SHAFT_RAD_PER_NM: f64 = 1e-8;
 
 /// Both counters, latched together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,8 +102,7 @@ impl Plant {
         let input_rad = TAU * (0.001 + 0.998 * draw);
         let place = mesh.locate(input_rad);
         // Teeth apart, in the middle of the gap.
-        let driven_rad =
-            0.5 * (mesh.flank(place, Flank::Ccw).psi_rad + mesh.flank(place, Flank::Cw).psi_rad);
+        let driven_rad = 0.5 * (mesh.flank(place, Flank::Ccw).psi_rad + mesh.flank(place, Flank::Cw).psi_rad);
         let chain = Chain::new(chain_spec(spec), input_rad, driven_rad);
         let loss = &spec.encoders.output_count_loss;
         let mut plant = Self {
@@ -134,13 +135,7 @@ impl Plant {
     /// # Errors
     /// [`PlantError::OutOfRange`] outside 1 Hz to 1 MHz; the plant then keeps its rate.
     pub fn set_sample_rate_hz(&mut self, sample_rate_hz: f64) -> Result<(), PlantError> {
-        in_range(
-            "sample_rate_hz",
-            sample_rate_hz,
-            "Hz",
-            (1.0, 1e6),
-            "10 kHz is usual",
-        )?;
+        in_range("sample_rate_hz", sample_rate_hz, "Hz", (1.0, 1e6), "10 kHz is usual")?;
         self.start_s = self.time_s();
         self.samples = 0;
         self.sample_rate_hz = sample_rate_hz;
@@ -151,18 +146,13 @@ impl Plant {
         self.servo.set_step(self.step_s);
         self.brake.set_step(self.step_s);
         let skew_s = self.spec.encoders.time_skew_s;
-        self.skew =
-            (skew_s != 0.0).then(|| Delay::new(skew_s.abs(), self.step_s, self.early_angle_rad()));
+        self.skew = (skew_s != 0.0).then(|| Delay::new(skew_s.abs(), self.step_s, self.early_angle_rad()));
         Ok(())
     }
 
     /// Angle of the shaft that is latched early: the input for a positive skew.
     fn early_angle_rad(&self) -> f64 {
-        if self.spec.encoders.time_skew_s > 0.0 {
-            self.chain.q[INPUT]
-        } else {
-            self.chain.q[DISC]
-        }
+        if self.spec.encoders.time_skew_s > 0.0 { self.chain.q[INPUT] } else { self.chain.q[DISC] }
     }
 
     /// Advances the rig by exactly one sample period and latches both counters.
@@ -174,8 +164,7 @@ impl Plant {
         self.samples += 1;
         if self.spec.housing.growth_mm != 0.0 {
             // Δa(t) = Δa (1 − exp(−t/τ))
-            self.mesh
-                .set_warmth(-(-self.time_s() / self.spec.housing.time_constant_s).exp_m1());
+            self.mesh.set_warmth(-(-self.time_s() / self.spec.housing.time_constant_s).exp_m1());
         }
         let (mut input_rad, mut output_rad) = (self.chain.q[INPUT], self.chain.q[DISC]);
         if let Some(skew) = &self.skew {
@@ -185,18 +174,13 @@ impl Plant {
                 output_rad = skew.angle_rad();
             }
         }
-        Sample {
-            input_counts: self.input.read(input_rad),
-            output_counts: self.output.read(output_rad),
-        }
+        Sample { input_counts: self.input.read(input_rad), output_counts: self.output.read(output_rad) }
     }
 
     #[inline]
     fn advance(&mut self) {
         let h = self.step_s;
-        let torque_nm = self
-            .servo
-            .torque_nm(self.chain.q[INPUT], self.chain.v[INPUT]);
+        let torque_nm = self.servo.torque_nm(self.chain.q[INPUT], self.chain.v[INPUT]);
         let (friction_nm, viscous_nm_s_per_rad) = self.servo.friction();
         let travel_rad = (h * self.chain.v[GEAR1]).abs();
         let drive = Drive {
@@ -207,8 +191,7 @@ impl Plant {
             run_out_mm: self.run_out.advance(travel_rad),
         };
         self.chain.step(h, &drive, &self.mesh);
-        self.brake
-            .heat(self.chain.brake_torque_nm, self.chain.v[ROTOR]);
+        self.brake.heat(self.chain.brake_torque_nm, self.chain.v[ROTOR]);
         if let Some(creep) = &mut self.creep {
             self.clamp_slip_rad = creep.advance(travel_rad, self.chain.load_torque_nm);
         }
@@ -249,20 +232,15 @@ impl Plant {
 
     /// Counts per revolution of input and output encoder.
     #[must_use]
-    pub fn counts_per_rev(&self) -> [u64; 2] {
-        [
-            self.spec.encoders.input.counts_per_rev(),
-            self.spec.encoders.output.counts_per_rev(),
-        ]
+    pub fn counts_per_rev(&self) -> (u64, u64) {
+        let encoders = &self.spec.encoders;
+        (encoders.input.counts_per_rev(), encoders.output.counts_per_rev())
     }
 
     /// Lines of input and output encoder.
     #[must_use]
-    pub fn lines(&self) -> [u32; 2] {
-        [
-            self.spec.encoders.input.lines,
-            self.spec.encoders.output.lines,
-        ]
+    pub fn lines(&self) -> (u32, u32) {
+        (self.spec.encoders.input.lines, self.spec.encoders.output.lines)
     }
 
     /// Nominal driven angle f(θ1) of the pair, rad.
@@ -277,20 +255,17 @@ impl Plant {
         self.curves.ratio(theta1_rad)
     }
 
-    /// Transmission error of the rigid, displaced pair on `flank` at gear 1's angle, rad: the exact contact of the moment.
+    /// Transmission error of the rigid, displaced pair on `flank` at gear 1's angle, rad: the exact contact of the
+    /// moment.
     #[must_use]
     pub fn rigid_error_rad(&self, theta1_rad: f64, flank: Flank) -> f64 {
-        self.mesh.flank(self.mesh.locate(theta1_rad), flank).psi_rad
-            - self.curves.driven_angle(theta1_rad)
+        self.mesh.flank(self.mesh.locate(theta1_rad), flank).psi_rad - self.curves.driven_angle(theta1_rad)
     }
 
     /// Lever arm of the common normal of `flank` about the driven axis, mm.
     #[must_use]
     pub fn driven_arm_mm(&self, theta1_rad: f64, flank: Flank) -> f64 {
-        self.mesh
-            .flank(self.mesh.locate(theta1_rad), flank)
-            .arm_squared_mm2
-            .sqrt()
+        self.mesh.flank(self.mesh.locate(theta1_rad), flank).arm_squared_mm2.sqrt()
     }
 
     /// The true state.
@@ -354,8 +329,7 @@ impl Plant {
 
     /// The brake's current source: on or off, and its limits.
     pub fn set_drive(&mut self, enabled: bool, current_limit_a: f64, voltage_limit_v: f64) {
-        self.brake
-            .set_drive(enabled, current_limit_a, voltage_limit_v);
+        self.brake.set_drive(enabled, current_limit_a, voltage_limit_v);
     }
 
     /// Coil current, A.
@@ -385,9 +359,9 @@ impl Plant {
 
 fn chain_spec(spec: &PlantSpec) -> ChainSpec {
     let shafts = &spec.shafts;
-    let spring = |compliance_rad_per_nm: f64, damping_time_s: f64| Spring {
-        stiffness_nm_per_rad: 1.0 / compliance_rad_per_nm,
-        damping_nm_s_per_rad: damping_time_s / compliance_rad_per_nm,
+    let spring = |compliance_rad_per_nm: f64, damping_time_s: f64| {
+        let stiffness_nm_per_rad = 1.0 / compliance_rad_per_nm.max(RIGID_SHAFT_RAD_PER_NM);
+        Spring { stiffness_nm_per_rad, damping_nm_s_per_rad: damping_time_s * stiffness_nm_per_rad }
     };
     let step_up = spec.brake.step_up;
     let mut inertia_kg_m2 = [0.0; 5];
@@ -401,15 +375,8 @@ fn chain_spec(spec: &PlantSpec) -> ChainSpec {
         bearing_nm_s_per_rad: shafts.bearing_nm_s_per_rad,
         input_shaft: spring(shafts.compliance_input_rad_per_nm, shafts.damping_time_s),
         output_shaft: spring(shafts.compliance_output_rad_per_nm, shafts.damping_time_s),
-        brake_coupling: spring(
-            shafts.compliance_brake_rad_per_nm,
-            shafts.brake_damping_time_s,
-        ),
-        cardan: (shafts.output_cardan_angle_rad != 0.0).then(|| {
-            (
-                (0.5 * shafts.output_cardan_angle_rad).tan().powi(2),
-                shafts.output_cardan_phase_rad,
-            )
-        }),
+        brake_coupling: spring(shafts.compliance_brake_rad_per_nm, shafts.brake_damping_time_s),
+        cardan: (shafts.output_cardan_angle_rad != 0.0)
+            .then(|| ((0.5 * shafts.output_cardan_angle_rad).tan().powi(2), shafts.output_cardan_phase_rad)),
     }
 }

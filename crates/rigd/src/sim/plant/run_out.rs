@@ -1,7 +1,7 @@
 //! Non-repeatable run-out of the bearings: why two revolutions are never quite alike.
 //!
-//! The gears' distance along the pitch line wanders as an Ornstein–Uhlenbeck process over the angle travelled, in either sense:
-//! x ← x e^(−Δ/L) + σ √(1 − e^(−2Δ/L)) N(0, 1), drawn at knots and joined by straight lines.
+//! The gears' distance along the pitch line wanders as an Ornstein–Uhlenbeck process over the angle travelled, in
+//! either sense: x ← x e^(−Δ/L) + σ √(1 − e^(−2Δ/L)) N(0, 1), drawn at knots and joined by straight lines.
 
 use super::error::{PlantError, in_range};
 use rand_distr::{Distribution, StandardNormal};
@@ -22,22 +22,13 @@ pub struct NoiseSpec {
 
 impl Default for NoiseSpec {
     fn default() -> Self {
-        Self {
-            run_out_rms_mm: 7.25e-5,
-            run_out_correlation_rev: 0.3,
-        }
+        Self { run_out_rms_mm: 7.25e-5, run_out_correlation_rev: 0.3 }
     }
 }
 
 impl NoiseSpec {
     pub(super) fn validate(&self) -> Result<(), PlantError> {
-        in_range(
-            "noise.run_out_rms_mm",
-            self.run_out_rms_mm,
-            "mm",
-            (0.0, 0.1),
-            "RMS along the pitch line",
-        )?;
+        in_range("noise.run_out_rms_mm", self.run_out_rms_mm, "mm", (0.0, 0.1), "RMS along the pitch line")?;
         in_range(
             "noise.run_out_correlation_rev",
             self.run_out_correlation_rev,
@@ -104,13 +95,8 @@ mod tests {
         let step = TAU / 100.0;
         let values: Vec<f64> = (0..400_000).map(|_| process.advance(step)).collect();
         let variance = values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
-        assert!(
-            (variance.sqrt() / 7.25e-5 - 1.0).abs() < 0.05,
-            "{}",
-            variance.sqrt()
-        );
-        let lagged =
-            values.windows(31).map(|w| w[0] * w[30]).sum::<f64>() / values.len() as f64 / variance;
+        assert!((variance.sqrt() / 7.25e-5 - 1.0).abs() < 0.05, "{}", variance.sqrt());
+        let lagged = values.windows(31).map(|w| w[0] * w[30]).sum::<f64>() / values.len() as f64 / variance;
         assert!((lagged - (-1.0f64).exp()).abs() < 0.05, "{lagged}");
     }
 

@@ -54,34 +54,10 @@ impl Default for DriveSpec {
 
 impl DriveSpec {
     pub(super) fn validate(&self) -> Result<(), PlantError> {
-        in_range(
-            "drive.reduction",
-            self.reduction,
-            "",
-            (0.1, 1000.0),
-            "motor turns per driver turn",
-        )?;
-        in_range(
-            "drive.inertia_kg_m2",
-            self.inertia_kg_m2,
-            "kg·m²",
-            (1e-4, 100.0),
-            "at the driver shaft",
-        )?;
-        in_range(
-            "drive.rated_torque_nm",
-            self.rated_torque_nm,
-            "N·m",
-            (1e-3, 1e4),
-            "at the motor shaft",
-        )?;
-        in_range(
-            "drive.torque_limit_ratio",
-            self.torque_limit_ratio,
-            "",
-            (0.01, 10.0),
-            "3 means 300 % of rated",
-        )?;
+        in_range("drive.reduction", self.reduction, "", (0.1, 1000.0), "motor turns per driver turn")?;
+        in_range("drive.inertia_kg_m2", self.inertia_kg_m2, "kg·m²", (1e-4, 100.0), "at the driver shaft")?;
+        in_range("drive.rated_torque_nm", self.rated_torque_nm, "N·m", (1e-3, 1e4), "at the motor shaft")?;
+        in_range("drive.torque_limit_ratio", self.torque_limit_ratio, "", (0.01, 10.0), "3 means 300 % of rated")?;
         in_range(
             "drive.bandwidth_hz",
             self.bandwidth_hz,
@@ -90,20 +66,8 @@ impl DriveSpec {
             "keep the loop well under the step rate",
         )?;
         let tuned = self.tuned_inertia_kg_m2;
-        in_range(
-            "drive.tuned_inertia_kg_m2",
-            tuned,
-            "kg·m²",
-            (1e-4, 100.0),
-            "near the inertia of the whole rig",
-        )?;
-        in_range(
-            "drive.friction_nm",
-            self.friction_nm,
-            "N·m",
-            (0.0, 1e3),
-            "at the driver shaft",
-        )?;
+        in_range("drive.tuned_inertia_kg_m2", tuned, "kg·m²", (1e-4, 100.0), "near the inertia of the whole rig")?;
+        in_range("drive.friction_nm", self.friction_nm, "N·m", (0.0, 1e3), "at the driver shaft")?;
         in_range(
             "drive.viscous_nm_s_per_rad",
             self.viscous_nm_s_per_rad,
@@ -112,20 +76,8 @@ impl DriveSpec {
             "at the driver shaft",
         )?;
         for &(order, amplitude) in &self.ripple {
-            in_range(
-                "drive.ripple order",
-                f64::from(order),
-                "",
-                (1.0, 64.0),
-                "orders of the motor turn",
-            )?;
-            in_range(
-                "drive.ripple amplitude",
-                amplitude,
-                "",
-                (0.0, 0.2),
-                "in parts of the speed",
-            )?;
+            in_range("drive.ripple order", f64::from(order), "", (1.0, 64.0), "orders of the motor turn")?;
+            in_range("drive.ripple amplitude", amplitude, "", (0.0, 0.2), "in parts of the speed")?;
         }
         Ok(())
     }
@@ -134,7 +86,6 @@ impl DriveSpec {
 /// The running drive.
 #[derive(Debug, Clone)]
 pub(super) struct Servo {
-    reduction: f64,
     rated_torque_nm: f64,
     torque_limit_nm: f64,
     proportional_nm_s_per_rad: f64,
@@ -144,6 +95,7 @@ pub(super) struct Servo {
     /// Relative velocity error over the motor turn; the last point repeats the first.
     ripple: Vec<f64>,
     motor_turns_per_rad: f64,
+    rad_per_s_per_motor_rpm: f64,
     enabled: bool,
     reference_rpm: f64,
     ramped_rpm: f64,
@@ -172,14 +124,10 @@ impl Servo {
         let ripple = (0..=RIPPLE_POINTS)
             .map(|n| {
                 let turn = TAU * (n % RIPPLE_POINTS) as f64 / RIPPLE_POINTS as f64;
-                spec.ripple
-                    .iter()
-                    .map(|&(order, size)| size * (f64::from(order) * turn).cos())
-                    .sum()
+                spec.ripple.iter().map(|&(order, size)| size * (f64::from(order) * turn).cos()).sum()
             })
             .collect();
         Self {
-            reduction: spec.reduction,
             rated_torque_nm: spec.rated_torque_nm * spec.reduction,
             torque_limit_nm: spec.rated_torque_nm * spec.reduction * spec.torque_limit_ratio,
             proportional_nm_s_per_rad: proportional,
@@ -189,6 +137,7 @@ impl Servo {
             viscous_nm_s_per_rad: spec.viscous_nm_s_per_rad,
             ripple,
             motor_turns_per_rad: spec.reduction / TAU,
+            rad_per_s_per_motor_rpm: RAD_PER_S_PER_RPM / spec.reduction,
             enabled: false,
             reference_rpm: 0.0,
             ramped_rpm: 0.0,
@@ -243,7 +192,7 @@ impl Servo {
     }
 
     pub fn speed_rpm(&self) -> f64 {
-        self.filtered_speed_rad_per_s * self.reduction / RAD_PER_S_PER_RPM
+        self.filtered_speed_rad_per_s / self.rad_per_s_per_motor_rpm
     }
 
     pub fn torque_percent(&self) -> f64 {
@@ -260,8 +209,9 @@ impl Servo {
         self.speed_rad_per_s = speed_rad_per_s;
         if self.enabled {
             self.ramp();
-            let reference = self.ramped_rpm * (RAD_PER_S_PER_RPM / self.reduction);
-            // The drive's own encoder reads a speed that is wrong once and twice a motor turn; the loop turns it into ripple.
+            let reference = self.ramped_rpm * self.rad_per_s_per_motor_rpm;
+            // The drive's own encoder reads a speed that is wrong once and twice a motor turn; the loop turns it into
+            // ripple.
             let measured = speed_rad_per_s * (1.0 + self.ripple_at(angle_rad));
             let error = reference - measured;
             let wanted = self.proportional_nm_s_per_rad * error + self.integral_nm;
@@ -273,8 +223,7 @@ impl Servo {
         } else {
             self.torque_nm = 0.0;
         }
-        self.filtered_speed_rad_per_s +=
-            self.step.smoothing * (speed_rad_per_s - self.filtered_speed_rad_per_s);
+        self.filtered_speed_rad_per_s += self.step.smoothing * (speed_rad_per_s - self.filtered_speed_rad_per_s);
         self.filtered_torque_nm += self.step.smoothing * (self.torque_nm - self.filtered_torque_nm);
         self.torque_nm
     }
@@ -283,15 +232,9 @@ impl Servo {
     #[inline]
     pub fn friction(&self) -> (f64, f64) {
         if self.speed_rad_per_s.abs() > FRICTION_CREEP_RAD_PER_S {
-            (
-                self.friction_nm.copysign(self.speed_rad_per_s),
-                self.viscous_nm_s_per_rad,
-            )
+            (self.friction_nm.copysign(self.speed_rad_per_s), self.viscous_nm_s_per_rad)
         } else {
-            (
-                0.0,
-                self.viscous_nm_s_per_rad + self.friction_nm / FRICTION_CREEP_RAD_PER_S,
-            )
+            (0.0, self.viscous_nm_s_per_rad + self.friction_nm / FRICTION_CREEP_RAD_PER_S)
         }
     }
 
@@ -325,10 +268,7 @@ mod tests {
     use super::*;
 
     fn servo(dt_s: f64) -> Servo {
-        let mut servo = Servo::new(&DriveSpec {
-            ripple: Vec::new(),
-            ..DriveSpec::default()
-        });
+        let mut servo = Servo::new(&DriveSpec { ripple: Vec::new(), ..DriveSpec::default() });
         servo.set_step(dt_s);
         servo
     }

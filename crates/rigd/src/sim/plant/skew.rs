@@ -14,12 +14,7 @@ impl Delay {
     pub fn new(delay_s: f64, dt_s: f64, angle_rad: f64) -> Self {
         let steps = delay_s / dt_s;
         let steps_back = steps.floor() as usize;
-        Self {
-            angles: vec![angle_rad; steps_back + 2],
-            newest: 0,
-            steps_back,
-            fraction: steps - steps_back as f64,
-        }
+        Self { angles: vec![angle_rad; steps_back + 2], newest: 0, steps_back, fraction: steps - steps_back as f64 }
     }
 
     /// Notes the angle at the end of a step.
@@ -50,10 +45,7 @@ mod tests {
             for n in 1..50 {
                 shaft.push(f64::from(n) * 1e-3);
             }
-            assert!(
-                (shaft.angle_rad() - (49e-3 - delay)).abs() < 1e-12,
-                "{delay}"
-            );
+            assert!((shaft.angle_rad() - (49e-3 - delay)).abs() < 1e-12, "{delay}");
         }
     }
 }

@@ -18,38 +18,16 @@ pub struct ClampSpec {
 
 impl Default for ClampSpec {
     fn default() -> Self {
-        Self {
-            creep_rad_per_rev_nm: 0.0,
-            threshold_nm: 0.0,
-            event_rad: 2e-6,
-        }
+        Self { creep_rad_per_rev_nm: 0.0, threshold_nm: 0.0, event_rad: 2e-6 }
     }
 }
 
 impl ClampSpec {
     pub(super) fn validate(&self) -> Result<(), PlantError> {
         let creep = self.creep_rad_per_rev_nm;
-        in_range(
-            "clamp.creep_rad_per_rev_nm",
-            creep,
-            "rad/(N·m)",
-            (0.0, 0.01),
-            "per driver revolution",
-        )?;
-        in_range(
-            "clamp.threshold_nm",
-            self.threshold_nm,
-            "N·m",
-            (0.0, 1e4),
-            "torque up to which it holds",
-        )?;
-        in_range(
-            "clamp.event_rad",
-            self.event_rad,
-            "rad",
-            (1e-9, 0.01),
-            "mean size of one slip",
-        )
+        in_range("clamp.creep_rad_per_rev_nm", creep, "rad/(N·m)", (0.0, 0.01), "per driver revolution")?;
+        in_range("clamp.threshold_nm", self.threshold_nm, "N·m", (0.0, 1e4), "torque up to which it holds")?;
+        in_range("clamp.event_rad", self.event_rad, "rad", (1e-9, 0.01), "mean size of one slip")
     }
 }
 
@@ -115,12 +93,7 @@ impl CountLoss {
         }
         let mean_interval_rad = TAU / losses_per_rev;
         let draw: f64 = Exp1.sample(&mut rng);
-        Some(Self {
-            counts,
-            mean_interval_rad,
-            remaining_rad: mean_interval_rad * draw,
-            rng,
-        })
+        Some(Self { counts, mean_interval_rad, remaining_rad: mean_interval_rad * draw, rng })
     }
 
     /// Counts lost over `travel_rad` of driver rotation.
@@ -145,18 +118,9 @@ mod tests {
 
     #[test]
     fn the_clamp_creeps_per_revolution_above_its_threshold_only() {
-        let spec = ClampSpec {
-            creep_rad_per_rev_nm: 1e-6,
-            threshold_nm: 4.0,
-            event_rad: 2e-6,
-        };
+        let spec = ClampSpec { creep_rad_per_rev_nm: 1e-6, threshold_nm: 4.0, event_rad: 2e-6 };
         let mut creep = Creep::new(&spec, Pcg64Mcg::seed_from_u64(2)).unwrap();
-        let mut turn = |torque: f64| {
-            (0..1000)
-                .map(|_| creep.advance(TAU / 10.0, torque))
-                .last()
-                .unwrap()
-        };
+        let mut turn = |torque: f64| (0..1000).map(|_| creep.advance(TAU / 10.0, torque)).last().unwrap();
         assert_eq!(turn(3.9), 0.0);
         let slipped = turn(10.0);
         assert!((slipped - 100.0 * 6e-6).abs() < 2e-5, "{slipped}");

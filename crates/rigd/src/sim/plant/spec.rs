@@ -61,8 +61,8 @@ impl Default for ShaftSpec {
 
 impl ShaftSpec {
     fn validate(&self) -> Result<(), PlantError> {
-        let compliance = (1e-8, 0.1);
-        let hint = "a stiff shaft has 1e-6, a soft one 1e-3";
+        let compliance = (0.0, 0.1);
+        let hint = "a stiff shaft has 1e-6, a soft one 1e-3, a rigid one 0";
         in_range(
             "shafts.compliance_input_rad_per_nm",
             self.compliance_input_rad_per_nm,
@@ -84,56 +84,14 @@ impl ShaftSpec {
             compliance,
             hint,
         )?;
-        in_range(
-            "shafts.damping_time_s",
-            self.damping_time_s,
-            "s",
-            (0.0, 0.1),
-            "damping over stiffness",
-        )?;
-        in_range(
-            "shafts.brake_damping_time_s",
-            self.brake_damping_time_s,
-            "s",
-            (0.0, 0.1),
-            "damping over stiffness",
-        )?;
+        in_range("shafts.damping_time_s", self.damping_time_s, "s", (0.0, 0.1), "damping over stiffness")?;
+        in_range("shafts.brake_damping_time_s", self.brake_damping_time_s, "s", (0.0, 0.1), "damping over stiffness")?;
         let inertia = (1e-5, 100.0);
-        in_range(
-            "shafts.gear1_inertia_kg_m2",
-            self.gear1_inertia_kg_m2,
-            "kg·m²",
-            inertia,
-            "of gear 1",
-        )?;
-        in_range(
-            "shafts.gear2_inertia_kg_m2",
-            self.gear2_inertia_kg_m2,
-            "kg·m²",
-            inertia,
-            "of gear 2",
-        )?;
-        in_range(
-            "shafts.disc_inertia_kg_m2",
-            self.disc_inertia_kg_m2,
-            "kg·m²",
-            inertia,
-            "of the disc and its shaft",
-        )?;
-        in_range(
-            "shafts.bearing_nm_s_per_rad",
-            self.bearing_nm_s_per_rad,
-            "N·m·s/rad",
-            (0.0, 100.0),
-            "viscous",
-        )?;
-        in_range(
-            "shafts.output_cardan_angle_rad",
-            self.output_cardan_angle_rad,
-            "rad",
-            (-0.5, 0.5),
-            "under 0.5 rad",
-        )?;
+        in_range("shafts.gear1_inertia_kg_m2", self.gear1_inertia_kg_m2, "kg·m²", inertia, "of gear 1")?;
+        in_range("shafts.gear2_inertia_kg_m2", self.gear2_inertia_kg_m2, "kg·m²", inertia, "of gear 2")?;
+        in_range("shafts.disc_inertia_kg_m2", self.disc_inertia_kg_m2, "kg·m²", inertia, "of the disc and its shaft")?;
+        in_range("shafts.bearing_nm_s_per_rad", self.bearing_nm_s_per_rad, "N·m·s/rad", (0.0, 100.0), "viscous")?;
+        in_range("shafts.output_cardan_angle_rad", self.output_cardan_angle_rad, "rad", (-0.5, 0.5), "under 0.5 rad")?;
         in_range(
             "shafts.output_cardan_phase_rad",
             self.output_cardan_phase_rad,
@@ -206,9 +164,6 @@ mod tests {
         let mut spec = PlantSpec::default();
         spec.shafts.compliance_output_rad_per_nm = -1.0;
         let message = spec.validate().unwrap_err().to_string();
-        assert!(
-            message.contains("shafts.compliance_output_rad_per_nm is -1 rad/(N·m)"),
-            "{message}"
-        );
+        assert!(message.contains("shafts.compliance_output_rad_per_nm is -1 rad/(N·m)"), "{message}");
     }
 }

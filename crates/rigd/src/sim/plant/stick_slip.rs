@@ -1,8 +1,8 @@
 //! Irregular torque of a powder brake at low slip: chains of powder build up over the slip angle and break.
 //!
-//! Makers recommend at least 10 rpm of slip. Below, the torque rises steadily until the chains break at a random threshold, drops
-//! by as much as it rose, and builds up anew: a saw-tooth of zero mean over the slip angle (so the calibrated curve stays true)
-//! whose size grows in proportion to the slip that is missing.
+//! Makers recommend at least 10 rpm of slip. Below, the torque rises steadily until the chains break at a random
+//! threshold, drops by as much as it rose, and builds up anew: a saw-tooth of zero mean over the slip angle (so the
+//! calibrated curve stays true) whose size grows in proportion to the slip that is missing.
 
 use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64Mcg;
@@ -16,7 +16,7 @@ const THRESHOLDS: (f64, f64) = (0.5, 1.5);
 #[derive(Debug, Clone)]
 pub(super) struct StickSlip {
     ratio_at_rest: f64,
-    limit_rad_per_s: f64,
+    inverse_limit_s_per_rad: f64,
     inverse_build_up_rad: f64,
     release: f64,
     level: f64,
@@ -29,7 +29,7 @@ impl StickSlip {
     pub fn new(ratio_at_rest: f64, limit_rad_per_s: f64, build_up_rad: f64, rng: Pcg64Mcg) -> Self {
         Self {
             ratio_at_rest,
-            limit_rad_per_s,
+            inverse_limit_s_per_rad: 1.0 / limit_rad_per_s,
             inverse_build_up_rad: 1.0 / build_up_rad,
             release: 1.0,
             level: 0.0,
@@ -46,7 +46,7 @@ impl StickSlip {
     /// Relative deviation of the torque while the brake slips `slip_rad` at `slip_rad_per_s` (both positive).
     #[inline]
     pub fn deviation(&mut self, slip_rad: f64, slip_rad_per_s: f64) -> f64 {
-        let missing = 1.0 - slip_rad_per_s / self.limit_rad_per_s;
+        let missing = 1.0 - slip_rad_per_s * self.inverse_limit_s_per_rad;
         let mut target = 0.0;
         if missing > 0.0 {
             self.level += slip_rad * self.inverse_build_up_rad;
@@ -70,21 +70,11 @@ mod tests {
     /// (mean, RMS) of the deviation at a steady slip.
     fn statistics(rpm: f64) -> (f64, f64) {
         let speed = rpm * std::f64::consts::TAU / 60.0;
-        let mut powder = StickSlip::new(
-            0.0175,
-            10.0 * std::f64::consts::TAU / 60.0,
-            0.01,
-            Pcg64Mcg::seed_from_u64(5),
-        );
+        let mut powder = StickSlip::new(0.0175, 10.0 * std::f64::consts::TAU / 60.0, 0.01, Pcg64Mcg::seed_from_u64(5));
         powder.set_step(1e-4);
-        let values: Vec<f64> = (0..2_000_000)
-            .map(|_| powder.deviation(speed * 1e-4, speed))
-            .collect();
+        let values: Vec<f64> = (0..2_000_000).map(|_| powder.deviation(speed * 1e-4, speed)).collect();
         let count = values.len() as f64;
-        (
-            values.iter().sum::<f64>() / count,
-            (values.iter().map(|v| v * v).sum::<f64>() / count).sqrt(),
-        )
+        (values.iter().sum::<f64>() / count, (values.iter().map(|v| v * v).sum::<f64>() / count).sqrt())
     }
 
     #[test]

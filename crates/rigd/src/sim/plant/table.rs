@@ -55,8 +55,8 @@ pub(super) struct ContactTable {
 }
 
 impl ContactTable {
-    /// Tabulates the pair of `gears` with the centre distance grown by `growth_mm`, refining a grid of `at_least` cells a driver
-    /// turn until it is exact enough.
+    /// Tabulates the pair of `gears` with the centre distance grown by `growth_mm`, refining a grid of `at_least` cells
+    /// a driver turn until it is exact enough.
     pub fn new(gears: &GearSpec, growth_mm: f64, at_least: usize) -> Result<Self, PlantError> {
         let pair = MountedPair::new(gears, growth_mm);
         // Circular pairs hold nothing but first orders, elliptic ones the harmonics of the pitch curve.
@@ -98,10 +98,7 @@ impl ContactTable {
             let overlap_rad = ccw.psi2_rad - cw.psi2_rad;
             if overlap_rad > JAM_TOLERANCE_RAD {
                 let jam = Jam::new(pair, theta, overlap_rad);
-                if worst
-                    .as_ref()
-                    .is_none_or(|most| jam.backlash_needed_mm > most.backlash_needed_mm)
-                {
+                if worst.as_ref().is_none_or(|most| jam.backlash_needed_mm > most.backlash_needed_mm) {
                     worst = Some(jam);
                 }
             }
@@ -130,8 +127,7 @@ impl ContactTable {
                     )
                 };
                 let line = |from: f64, to: f64| [from, to - from];
-                let arm =
-                    |side: usize| line(here[side].arm2_mm.powi(2), next[side].arm2_mm.powi(2));
+                let arm = |side: usize| line(here[side].arm2_mm.powi(2), next[side].arm2_mm.powi(2));
                 Cell {
                     psi: [cubic(0), cubic(1)],
                     arm2_squared: [arm(0), arm(1)],
@@ -158,9 +154,7 @@ impl ContactTable {
             let theta = (n as f64 + 0.5) / self.cells_per_rad;
             let place = self.locate(theta);
             for flank in [Flank::Ccw, Flank::Cw] {
-                let miss = (self.flank(place, flank).psi_rad
-                    - pair.contact(flank, theta, 0.0)?.psi2_rad)
-                    .abs();
+                let miss = (self.flank(place, flank).psi_rad - pair.contact(flank, theta, 0.0)?.psi2_rad).abs();
                 if miss > worst.0 {
                     worst = (miss, theta);
                 }
@@ -176,11 +170,7 @@ impl ContactTable {
         let within = (turns - floor(turns)) * self.cells_f64;
         // Rounding may put an angle just under a whole turn on the turn itself.
         let cell = (within as usize).min(self.cells.len() - 1);
-        Place {
-            cell,
-            t: within - cell as f64,
-            base_rad: self.mean_ratio * theta1,
-        }
+        Place { cell, t: within - cell as f64, base_rad: self.mean_ratio * theta1 }
     }
 
     /// Geometry of `flank` at `place`.
@@ -205,24 +195,16 @@ impl ContactTable {
     }
 }
 
-/// Largest integer not above `x`, as f64; without the library call that `f64::floor` is on the baseline instruction set.
+/// Largest integer not above `x`, as f64; without the library call that `f64::floor` is on the baseline instruction
+/// set.
 #[inline]
 pub(super) fn floor(x: f64) -> f64 {
     let truncated = x as i64 as f64;
-    if truncated > x {
-        truncated - 1.0
-    } else {
-        truncated
-    }
+    if truncated > x { truncated - 1.0 } else { truncated }
 }
 
 fn hermite(p0: f64, m0: f64, p1: f64, m1: f64) -> [f64; 4] {
-    [
-        p0,
-        m0,
-        3.0 * (p1 - p0) - 2.0 * m0 - m1,
-        2.0 * (p0 - p1) + m0 + m1,
-    ]
+    [p0, m0, 3.0 * (p1 - p0) - 2.0 * m0 - m1, 2.0 * (p0 - p1) + m0 + m1]
 }
 
 /// Flanks that overlap, in terms of what would free them.
@@ -238,10 +220,7 @@ impl Jam {
         // A thinning j along the pitch curve opens (j/2) cos α along each normal, over the arms r2 cos(α ∓ μ).
         let opened_per_mm = 0.5 * alpha.cos() / pair.curves.driven_radius(theta1_rad)
             * (1.0 / (alpha - mu).cos() + 1.0 / (alpha + mu).cos());
-        Self {
-            theta1_rad,
-            backlash_needed_mm: overlap_rad / opened_per_mm,
-        }
+        Self { theta1_rad, backlash_needed_mm: overlap_rad / opened_per_mm }
     }
 }
 
@@ -251,19 +230,13 @@ mod tests {
 
     /// Exact columns of a reference file: θ1, f, TE ccw, TE cw.
     fn reference(file: &str) -> Vec<[f64; 4]> {
-        let path = format!(
-            "{}/../../fixtures/reference/{file}",
-            env!("CARGO_MANIFEST_DIR")
-        );
+        let path = format!("{}/../../fixtures/reference/{file}", env!("CARGO_MANIFEST_DIR"));
         std::fs::read_to_string(&path)
             .unwrap()
             .lines()
             .filter(|line| !line.starts_with('#') && !line.starts_with("theta1"))
             .map(|line| {
-                let columns: Vec<f64> = line
-                    .split(',')
-                    .map(|field| field.parse().unwrap())
-                    .collect();
+                let columns: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
                 [columns[0], columns[1], columns[2], columns[3]]
             })
             .collect()
@@ -271,29 +244,18 @@ mod tests {
 
     #[test]
     fn the_table_reproduces_the_reference_contact() {
-        for (file, k) in [
-            ("te_circular_k0.csv", 1e-12),
-            ("te_elliptic_k0.3287.csv", 0.3287),
-        ] {
-            // The reference has no backlash and jams; thinning moves both flanks apart, so it is compared flank by flank.
-            let gears = GearSpec {
-                eccentricity: k,
-                backlash_mm: 0.0,
-                ..GearSpec::default()
-            };
+        for (file, k) in [("te_circular_k0.csv", 1e-12), ("te_elliptic_k0.3287.csv", 0.3287)] {
+            // The reference has no backlash and jams; thinning moves both flanks apart, so it is compared flank by
+            // flank.
+            let gears = GearSpec { eccentricity: k, backlash_mm: 0.0, ..GearSpec::default() };
             let pair = MountedPair::new(&gears, 0.0);
             let rows = reference(file);
             assert_eq!(rows.len(), 90);
             for [theta, f, ccw, cw] in rows {
                 assert!((pair.curves.driven_angle(theta) - f).abs() < 1e-10);
                 for (flank, te) in [(Flank::Ccw, ccw), (Flank::Cw, cw)] {
-                    let got = pair.contact(flank, theta, 0.0).unwrap().psi2_rad
-                        - pair.curves.driven_angle(theta);
-                    assert!(
-                        (got - te).abs() < 1e-8,
-                        "{file} {} at {theta}: {got} against {te}",
-                        flank.name()
-                    );
+                    let got = pair.contact(flank, theta, 0.0).unwrap().psi2_rad - pair.curves.driven_angle(theta);
+                    assert!((got - te).abs() < 1e-8, "{file} {} at {theta}: {got} against {te}", flank.name());
                 }
             }
         }
@@ -302,10 +264,7 @@ mod tests {
     #[test]
     fn interpolation_is_exact_between_the_nodes_and_across_the_turn() {
         for k in [0.0, 0.3287, 0.6] {
-            let gears = GearSpec {
-                eccentricity: k,
-                ..GearSpec::default()
-            };
+            let gears = GearSpec { eccentricity: k, ..GearSpec::default() };
             let table = ContactTable::new(&gears, 0.01, 0).unwrap();
             let pair = MountedPair::new(&gears, 0.01);
             for n in -300..300 {
@@ -314,10 +273,7 @@ mod tests {
                 for flank in [Flank::Ccw, Flank::Cw] {
                     let exact = pair.contact(flank, theta, 0.0).unwrap();
                     let got = table.flank(place, flank);
-                    assert!(
-                        (got.psi_rad - exact.psi2_rad).abs() < 1e-10,
-                        "k = {k}, theta = {theta}"
-                    );
+                    assert!((got.psi_rad - exact.psi2_rad).abs() < 1e-10, "k = {k}, theta = {theta}");
                     assert!((got.ratio - exact.ratio).abs() < 1e-6);
                     assert!((got.arm_squared_mm2 / exact.arm2_mm.powi(2) - 1.0).abs() < 1e-4);
                 }
@@ -327,11 +283,7 @@ mod tests {
 
     #[test]
     fn unequal_tooth_numbers_repeat_after_whole_cycles() {
-        let gears = GearSpec {
-            eccentricity: 0.0,
-            teeth: [48, 32],
-            ..GearSpec::default()
-        };
+        let gears = GearSpec { eccentricity: 0.0, teeth: [48, 32], ..GearSpec::default() };
         let table = ContactTable::new(&gears, 0.0, 0).unwrap();
         let at = |theta: f64| table.flank(table.locate(theta), Flank::Ccw).psi_rad;
         assert!((at(0.4 + 2.0 * TAU) - at(0.4) - 3.0 * TAU).abs() < 1e-12);
@@ -340,23 +292,12 @@ mod tests {
 
     #[test]
     fn a_pair_without_room_jams_and_says_how_much_is_missing() {
-        let tight = GearSpec {
-            backlash_mm: 0.0,
-            ..GearSpec::default()
-        };
-        let Err(PlantError::TeethJam {
-            overlap_mm,
-            backlash_needed_mm,
-            ..
-        }) = ContactTable::new(&tight, 0.0, 0)
-        else {
+        let tight = GearSpec { backlash_mm: 0.0, ..GearSpec::default() };
+        let Err(PlantError::TeethJam { overlap_mm, backlash_needed_mm, .. }) = ContactTable::new(&tight, 0.0, 0) else {
             panic!("the documented eccentricities need backlash");
         };
         assert!(overlap_mm > 0.02 && overlap_mm < 0.1);
-        let eased = GearSpec {
-            backlash_mm: backlash_needed_mm * 1.01,
-            ..tight
-        };
+        let eased = GearSpec { backlash_mm: backlash_needed_mm * 1.01, ..tight };
         assert!(ContactTable::new(&eased, 0.0, 0).is_ok());
         assert!(ContactTable::new(&GearSpec::default().ideal(), 0.0, 0).is_ok());
     }

@@ -1,7 +1,8 @@
-//! Effects that the plant can have and the nominal model does not know. One file each: what it is, and how it enters the plant.
+//! Effects that the plant can have and the nominal model does not know. One file each: what it is, and how it enters
+//! the plant.
 //!
-//! Sizes are those of a rig in need of attention: well above the noise, well below what one would see by eye. A new effect is a
-//! file and a line in [`UNDOCUMENTED`].
+//! Sizes are those of a rig in need of attention: well above the noise, well below what one would see by eye. A new
+//! effect is a file and a line in [`UNDOCUMENTED`].
 
 use super::PlantSpec;
 
@@ -27,82 +28,22 @@ pub type Undocumented = (&'static str, &'static str, fn(&mut PlantSpec));
 
 /// All effects, by the names under which the diagnosis knows them.
 pub const UNDOCUMENTED: &[Undocumented] = &[
-    (
-        "gear1_eccentricity",
-        "gear 1 sits 11 µm off the documented centre",
-        gear1_eccentricity::apply,
-    ),
-    (
-        "gear2_eccentricity",
-        "gear 2 sits 11 µm off the documented centre",
-        gear2_eccentricity::apply,
-    ),
-    (
-        "centre_distance_error",
-        "centre distance 30 µm too large",
-        centre_distance_error::apply,
-    ),
-    (
-        "backlash_error",
-        "teeth 20 µm thinner than documented",
-        backlash_error::apply,
-    ),
-    (
-        "encoder1_eccentricity",
-        "input encoder's disc off centre by 4e-5 of its radius",
-        encoder1_eccentricity::apply,
-    ),
-    (
-        "encoder2_eccentricity",
-        "output encoder's disc off centre by 4e-5 of its radius",
-        encoder2_eccentricity::apply,
-    ),
-    (
-        "encoder1_ellipticity",
-        "input encoder's disc out of round by 3e-5",
-        encoder1_ellipticity::apply,
-    ),
-    (
-        "encoder2_ellipticity",
-        "output encoder's disc out of round by 3e-5",
-        encoder2_ellipticity::apply,
-    ),
-    (
-        "shaft_compliance_input",
-        "input shaft softer by 4e-6 rad/(N·m)",
-        shaft_compliance_input::apply,
-    ),
-    (
-        "shaft_compliance_output",
-        "output shaft softer by 6e-6 rad/(N·m)",
-        shaft_compliance_output::apply,
-    ),
-    (
-        "mesh_compliance",
-        "mesh softer by 0.03 mm²·rad/(N·m)",
-        mesh_compliance::apply,
-    ),
-    (
-        "slip",
-        "output clamp creeps 4 µrad per revolution and N·m above 4 N·m",
-        slip::apply,
-    ),
-    (
-        "count_loss",
-        "output counter loses 24 counts about every 1.4 revolutions",
-        count_loss::apply,
-    ),
+    ("gear1_eccentricity", "gear 1 sits 11 µm off the documented centre", gear1_eccentricity::apply),
+    ("gear2_eccentricity", "gear 2 sits 11 µm off the documented centre", gear2_eccentricity::apply),
+    ("centre_distance_error", "centre distance 30 µm too large", centre_distance_error::apply),
+    ("backlash_error", "teeth 20 µm thinner than documented", backlash_error::apply),
+    ("encoder1_eccentricity", "input encoder's disc off centre by 4e-5 of its radius", encoder1_eccentricity::apply),
+    ("encoder2_eccentricity", "output encoder's disc off centre by 4e-5 of its radius", encoder2_eccentricity::apply),
+    ("encoder1_ellipticity", "input encoder's disc out of round by 3e-5", encoder1_ellipticity::apply),
+    ("encoder2_ellipticity", "output encoder's disc out of round by 3e-5", encoder2_ellipticity::apply),
+    ("shaft_compliance_input", "input shaft softer by 4e-6 rad/(N·m)", shaft_compliance_input::apply),
+    ("shaft_compliance_output", "output shaft softer by 6e-6 rad/(N·m)", shaft_compliance_output::apply),
+    ("mesh_compliance", "mesh softer by 0.03 mm²·rad/(N·m)", mesh_compliance::apply),
+    ("slip", "output clamp creeps 4 µrad per revolution and N·m above 4 N·m", slip::apply),
+    ("count_loss", "output counter loses 24 counts about every 1.4 revolutions", count_loss::apply),
     ("time_skew", "output latched 60 µs late", time_skew::apply),
-    (
-        "thermal_drift",
-        "centre distance grows 20 µm within minutes",
-        thermal_drift::apply,
-    ),
-    (
-        "coupling_misalignment_output",
-        "output coupling bent by 0.8°",
-        coupling_misalignment_output::apply,
-    ),
+    ("thermal_drift", "centre distance grows 20 µm within minutes", thermal_drift::apply),
+    ("coupling_misalignment_output", "output coupling bent by 0.8°", coupling_misalignment_output::apply),
 ];
 
 #[cfg(test)]
