@@ -69,9 +69,7 @@ impl FromStr for Direction {
         match text.trim().to_ascii_lowercase().as_str() {
             "ccw" => Ok(Self::Ccw),
             "cw" => Ok(Self::Cw),
-            _ => Err(ParseDirectionError {
-                given: text.to_owned(),
-            }),
+            _ => Err(ParseDirectionError { given: text.to_owned() }),
         }
     }
 }

@@ -92,6 +92,26 @@ pub enum GeometryError {
         closing_mm: f64,
     },
 
+    /// A table by tooth of the wrong length.
+    #[error("a table of pitch errors for gear {gear} has {given} values: {teeth} (one a tooth) or none are needed")]
+    ToothTable {
+        /// 1 = driver, 2 = driven.
+        gear: u8,
+        /// Values given.
+        given: usize,
+        /// Teeth of that gear.
+        teeth: u32,
+    },
+
+    /// A tooth that the gear does not have.
+    #[error("tooth {tooth} does not exist: the driver's teeth are numbered 0 to {teeth} - 1")]
+    NoSuchTooth {
+        /// The tooth given.
+        tooth: u32,
+        /// Teeth of the driver.
+        teeth: u32,
+    },
+
     /// Flank and centre line stand so that the flank cannot drive.
     #[error(
         "effective pressure angle {effective_deg:.3} deg at theta1 = {theta1_rad:.6} rad exceeds {limit_deg} deg: the \
@@ -119,14 +139,7 @@ pub(crate) fn check_range(
         return Err(GeometryError::NotFinite { quantity, value });
     }
     if value < lower || value > upper {
-        return Err(GeometryError::OutOfRange {
-            quantity,
-            value,
-            unit,
-            lower,
-            upper,
-            advice,
-        });
+        return Err(GeometryError::OutOfRange { quantity, value, unit, lower, upper, advice });
     }
     Ok(value)
 }
@@ -141,11 +154,6 @@ pub(crate) fn check_teeth(gear: u8, teeth: u32) -> Result<u32, GeometryError> {
     if (MIN_TEETH..=MAX_TEETH).contains(&teeth) {
         Ok(teeth)
     } else {
-        Err(GeometryError::Teeth {
-            gear,
-            teeth,
-            lower: MIN_TEETH,
-            upper: MAX_TEETH,
-        })
+        Err(GeometryError::Teeth { gear, teeth, lower: MIN_TEETH, upper: MAX_TEETH })
     }
 }

@@ -12,11 +12,13 @@
 //! - [`Direction`] names the driver's sense of rotation and with it the active flank. TE of both senses is counted in the
 //!   same positive sense of θ2, so that backlash = TE_cw − TE_ccw at equal θ1.
 //!
-//! Reading order: [`pitch_curve`] → [`GearPair`] → [`increment`] → [`NominalModel`] (the model); [`measure`] (the
+//! Reading order: [`pitch_curve`] → [`GearPair`] → [`increment`] → [`NominalModel`] (the model, first order) → [`contact`] (the model, exact); [`measure`] (the
 //! measurement).
 
+pub mod contact;
 mod direction;
 mod errors;
+mod flank;
 mod geometry_error;
 pub mod increment;
 pub mod measure;
@@ -28,8 +30,9 @@ mod spec;
 
 pub use direction::{Direction, ParseDirectionError};
 pub use errors::Errors;
+pub use flank::Gear;
 pub use geometry_error::GeometryError;
 pub use model::NominalModel;
-pub use pair::{GearPair, MeshPoint};
+pub use pair::{GearPair, MeshPoint, RollPoint};
 pub use pair_file::{PairFile, PairFileError, PairSpec};
 pub use spec::{CircularSpec, EllipticalSpec};

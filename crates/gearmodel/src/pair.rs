@@ -42,6 +42,19 @@ pub struct MeshPoint {
     pub mu_rad: f64,
 }
 
+/// Everything rack generation needs at one rolling position of the pitch curves, evaluated once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RollPoint {
+    /// Kinematics at the rolling position.
+    pub at: MeshPoint,
+    /// tan μ.
+    pub tan_mu: f64,
+    /// dμ/dθ1. Both pitch curves are convex where −i21 < dμ/dθ1 < 1.
+    pub mu_slope: f64,
+    /// Arc length s rolled since θ1 = 0, mm.
+    pub arc_mm: f64,
+}
+
 /// The tooth data that all kinds of pairs share, as a drawing gives them.
 struct ToothData {
     module_mm: f64,
@@ -55,13 +68,7 @@ struct ToothData {
 
 impl ToothData {
     fn check(&self) -> Result<(), GeometryError> {
-        check_range(
-            "module_mm",
-            self.module_mm,
-            "mm",
-            (1e-3, 1e3),
-            "give the module of the rack",
-        )?;
+        check_range("module_mm", self.module_mm, "mm", (1e-3, 1e3), "give the module of the rack")?;
         check_teeth(1, self.teeth.0)?;
         check_teeth(2, self.teeth.1)?;
         check_range(
@@ -71,27 +78,9 @@ impl ToothData {
             (1.0, 45.0),
             "racks have 14.5, 20 or 25 deg; the angle is in degrees",
         )?;
-        check_range(
-            "face_width_mm",
-            self.face_width_mm,
-            "mm",
-            (1e-3, 1e5),
-            "give the width of the teeth",
-        )?;
-        check_range(
-            "addendum",
-            self.addendum,
-            "modules",
-            (0.1, 2.0),
-            "1 is the standard rack",
-        )?;
-        check_range(
-            "dedendum_clearance",
-            self.dedendum_clearance,
-            "modules",
-            (0.0, 1.0),
-            "0.25 is the standard rack",
-        )?;
+        check_range("face_width_mm", self.face_width_mm, "mm", (1e-3, 1e5), "give the width of the teeth")?;
+        check_range("addendum", self.addendum, "modules", (0.1, 2.0), "1 is the standard rack")?;
+        check_range("dedendum_clearance", self.dedendum_clearance, "modules", (0.0, 1.0), "0.25 is the standard rack")?;
         // A thinning of half a pitch leaves no tooth.
         check_range(
             "backlash_mm",
@@ -103,20 +92,12 @@ impl ToothData {
         Ok(())
     }
 
-    fn into_pair(
-        self,
-        curve: AnyCurve,
-        centre_distance_mm: f64,
-    ) -> Result<GearPair, GeometryError> {
+    fn into_pair(self, curve: AnyCurve, centre_distance_mm: f64) -> Result<GearPair, GeometryError> {
         let (mu_rad, theta1_rad) = curve.max_inclination();
         let effective_deg = mu_rad.to_degrees() + self.pressure_angle_deg;
         if effective_deg > MAX_EFFECTIVE_PRESSURE_ANGLE_DEG {
             let limit_deg = MAX_EFFECTIVE_PRESSURE_ANGLE_DEG;
-            return Err(GeometryError::FlankTooSteep {
-                effective_deg,
-                theta1_rad,
-                limit_deg,
-            });
+            return Err(GeometryError::FlankTooSteep { effective_deg, theta1_rad, limit_deg });
         }
         Ok(GearPair {
             curve,
@@ -158,24 +139,15 @@ impl GearPair {
         let (teeth1, teeth2) = spec.teeth;
         if teeth1 != teeth2 {
             let needed = f64::from(teeth1);
-            return Err(GeometryError::TeethRatio {
-                kind: "elliptical",
-                teeth1,
-                teeth2,
-                needed,
-            });
+            return Err(GeometryError::TeethRatio { kind: "elliptical", teeth1, teeth2, needed });
         }
         let ellipse = Ellipse::new(spec.eccentricity);
         // Tooth condition: perimeter = π m Z1 fixes the scale, and with it the centre distance that closes.
         let closing_mm = PI * spec.module_mm * f64::from(teeth1) / ellipse.arc(TAU);
         if let Some(given_mm) = spec.centre_distance_mm {
-            check_centre_distance(
-                given_mm,
-                closing_mm,
-                1.0,
-                (ellipse.radius_range().1, 0.0),
-                |distance| ellipse.closure_at(distance),
-            )?;
+            check_centre_distance(given_mm, closing_mm, 1.0, (ellipse.radius_range().1, 0.0), |distance| {
+                ellipse.closure_at(distance)
+            })?;
         }
         data.into_pair(ellipse.into(), closing_mm)
     }
@@ -238,11 +210,7 @@ impl GearPair {
     /// Kind of pair as in `pair.toml`.
     #[must_use]
     pub fn kind(&self) -> &'static str {
-        if self.has_teeth() {
-            self.curve.kind()
-        } else {
-            "constant"
-        }
+        if self.has_teeth() { self.curve.kind() } else { "constant" }
     }
 
     /// False for [`GearPair::constant`], of which no teeth are known.
@@ -387,6 +355,33 @@ impl GearPair {
         }
     }
 
+    /// Kinematics, slope of the inclination and arc length at a rolling position.
+    #[must_use]
+    #[inline]
+    pub fn roll(&self, theta1_rad: f64) -> RollPoint {
+        let roll = self.curve.roll(theta1_rad);
+        let ratio = roll.motion.ratio;
+        let r2_mm = self.centre_distance_mm / (1.0 + ratio);
+        // g = tan μ = i'/(i (1 + i)); μ' = g'/(1 + g²)
+        let inverse = 1.0 / (ratio * (1.0 + ratio));
+        let slope = roll.motion.ratio_slope;
+        let tan_mu = slope * inverse;
+        let tan_mu_slope = roll.ratio_curvature * inverse - tan_mu * tan_mu * (1.0 + 2.0 * ratio);
+        RollPoint {
+            at: MeshPoint {
+                theta1_rad,
+                theta2_rad: roll.motion.theta2_rad,
+                ratio,
+                r1_mm: r2_mm * ratio,
+                r2_mm,
+                mu_rad: tan_mu.atan(),
+            },
+            tan_mu,
+            mu_slope: tan_mu_slope / (1.0 + tan_mu * tan_mu),
+            arc_mm: self.centre_distance_mm * roll.arc,
+        }
+    }
+
     /// Arc length s(θ1) of the driver's pitch curve from θ1 = 0, mm, unwrapped.
     #[must_use]
     pub fn arc_length_mm(&self, theta1_rad: f64) -> f64 {
@@ -421,12 +416,9 @@ fn check_centre_distance(
         return Ok(());
     }
     Err(match closure_at(given_mm / closing_mm) {
-        Some(closure_sum) => GeometryError::NotClosing {
-            centre_distance_mm: given_mm,
-            closure_sum,
-            closure_needed,
-            closing_mm,
-        },
+        Some(closure_sum) => {
+            GeometryError::NotClosing { centre_distance_mm: given_mm, closure_sum, closure_needed, closing_mm }
+        }
         None => GeometryError::NoDrivenCurve {
             centre_distance_mm: given_mm,
             radius_mm: limit.0 * closing_mm,

@@ -67,9 +67,7 @@ pub enum PairFileError {
         allowed: String,
     },
     /// A key that this kind of pair does not have.
-    #[error(
-        "pair file, line {line}: key `{key}` does not belong to kind = \"{kind}\": allowed are {allowed}"
-    )]
+    #[error("pair file, line {line}: key `{key}` does not belong to kind = \"{kind}\": allowed are {allowed}")]
     KeyOfOtherKind {
         /// Line of the file, from 1.
         line: usize,
@@ -124,11 +122,8 @@ const TOOTH_KEYS: [&str; 8] = [
 ];
 
 /// Kinds of pairs and the keys that each has beside `kind` and `documented`.
-const KINDS: [(&str, bool, &[&str]); 3] = [
-    ("elliptical", true, &["eccentricity"]),
-    ("circular", true, &[]),
-    ("constant", false, &["ratio"]),
-];
+const KINDS: [(&str, bool, &[&str]); 3] =
+    [("elliptical", true, &["eccentricity"]), ("circular", true, &[]), ("constant", false, &["ratio"])];
 
 impl PairFile {
     /// Reads the text of a `pair.toml`.
@@ -141,8 +136,7 @@ impl PairFile {
             message: error.message().to_owned(),
         })?;
         let kind = raw.kind.as_deref().unwrap_or("elliptical");
-        let Some(&(kind, has_teeth, own_keys)) = KINDS.iter().find(|(name, ..)| *name == kind)
-        else {
+        let Some(&(kind, has_teeth, own_keys)) = KINDS.iter().find(|(name, ..)| *name == kind) else {
             return Err(PairFileError::UnknownKind {
                 line: line_of_key(text, "kind"),
                 kind: kind.to_owned(),
@@ -150,18 +144,12 @@ impl PairFile {
             });
         };
         raw.refuse_keys_of_other_kinds(text, kind, has_teeth, own_keys)?;
-        let need = |key: &'static str, value: Option<f64>| {
-            value.ok_or(PairFileError::MissingKey { key, kind })
-        };
+        let need = |key: &'static str, value: Option<f64>| value.ok_or(PairFileError::MissingKey { key, kind });
         let gears = match kind {
-            "constant" => PairSpec::Constant {
-                ratio: need("ratio", raw.ratio)?,
-            },
+            "constant" => PairSpec::Constant { ratio: need("ratio", raw.ratio)? },
             _ => {
                 let module_mm = need("module_mm", raw.module_mm)?;
-                let [teeth1, teeth2] = raw
-                    .teeth
-                    .ok_or(PairFileError::MissingKey { key: "teeth", kind })?;
+                let [teeth1, teeth2] = raw.teeth.ok_or(PairFileError::MissingKey { key: "teeth", kind })?;
                 let common = CircularSpec {
                     module_mm,
                     teeth: (teeth1, teeth2),
@@ -189,10 +177,7 @@ impl PairFile {
                 }
             }
         };
-        Ok(Self {
-            gears,
-            documented: raw.documented,
-        })
+        Ok(Self { gears, documented: raw.documented })
     }
 
     /// The nominal model, checked.
@@ -249,18 +234,9 @@ impl PairFile {
         line("phi1_rad", &errors.phi1_rad);
         line("e2_mm", &errors.e2_mm);
         line("phi2_rad", &errors.phi2_rad);
-        line(
-            "shaft_compliance_output_rad_per_nm",
-            &errors.shaft_compliance_output_rad_per_nm,
-        );
-        line(
-            "shaft_compliance_input_rad_per_nm",
-            &errors.shaft_compliance_input_rad_per_nm,
-        );
-        line(
-            "mesh_compliance_mm2_rad_per_nm",
-            &errors.mesh_compliance_mm2_rad_per_nm,
-        );
+        line("shaft_compliance_output_rad_per_nm", &errors.shaft_compliance_output_rad_per_nm);
+        line("shaft_compliance_input_rad_per_nm", &errors.shaft_compliance_input_rad_per_nm);
+        line("mesh_compliance_mm2_rad_per_nm", &errors.mesh_compliance_mm2_rad_per_nm);
         text
     }
 }
@@ -288,12 +264,8 @@ impl RawFile {
         ];
         for (key, present) in given {
             if present && !own_keys.contains(&key) && !tooth_keys.contains(&key) {
-                let allowed = ["kind"]
-                    .iter()
-                    .chain(own_keys)
-                    .chain(tooth_keys)
-                    .map(|key| format!("`{key}`"))
-                    .collect::<Vec<_>>();
+                let allowed =
+                    ["kind"].iter().chain(own_keys).chain(tooth_keys).map(|key| format!("`{key}`")).collect::<Vec<_>>();
                 return Err(PairFileError::KeyOfOtherKind {
                     line: line_of_key(text, key),
                     key,
@@ -308,21 +280,13 @@ impl RawFile {
 
 /// Line (from 1) of a byte offset.
 fn line_at(text: &str, offset: usize) -> usize {
-    text.bytes()
-        .take(offset)
-        .filter(|byte| *byte == b'\n')
-        .count()
-        + 1
+    text.bytes().take(offset).filter(|byte| *byte == b'\n').count() + 1
 }
 
 /// Line (from 1) on which a top-level key stands.
 fn line_of_key(text: &str, key: &str) -> usize {
     text.lines()
-        .position(|line| {
-            line.trim_start()
-                .strip_prefix(key)
-                .is_some_and(|rest| rest.trim_start().starts_with('='))
-        })
+        .position(|line| line.trim_start().strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('=')))
         .map_or(1, |index| index + 1)
 }
 
@@ -352,10 +316,9 @@ phi2_rad = 1.1
         let model = file.model().unwrap();
         assert_eq!(model.errors.e2_mm, 0.03);
         assert!((model.pair.centre_distance_mm() - 144.999_717).abs() < 1e-6);
-        for text in [
-            "kind = \"constant\"\nratio = 81",
-            "kind=\"circular\"\nmodule_mm=2\nteeth=[20,31]\nbacklash_mm=1e-7",
-        ] {
+        for text in
+            ["kind = \"constant\"\nratio = 81", "kind=\"circular\"\nmodule_mm=2\nteeth=[20,31]\nbacklash_mm=1e-7"]
+        {
             let file = PairFile::parse(text).unwrap();
             assert_eq!(PairFile::parse(&file.to_toml()).unwrap(), file);
             file.model().unwrap();
@@ -364,68 +327,32 @@ phi2_rad = 1.1
 
     #[test]
     fn an_unknown_key_is_named_with_its_line_and_the_allowed_ones() {
-        let error = PairFile::parse(&SOURCE_PAIR.replace("eccentricity", "excentricity"))
-            .unwrap_err()
-            .to_string();
+        let error = PairFile::parse(&SOURCE_PAIR.replace("eccentricity", "excentricity")).unwrap_err().to_string();
         assert!(
-            error.contains("line 5")
-                && error.contains("excentricity")
-                && error.contains("`eccentricity`"),
+            error.contains("line 5") && error.contains("excentricity") && error.contains("`eccentricity`"),
             "{error}"
         );
-        let error = PairFile::parse(&SOURCE_PAIR.replace("e2_mm", "e3_mm"))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("line 12") && error.contains("e3_mm") && error.contains("`e2_mm`"),
-            "{error}"
-        );
+        let error = PairFile::parse(&SOURCE_PAIR.replace("e2_mm", "e3_mm")).unwrap_err().to_string();
+        assert!(error.contains("line 12") && error.contains("e3_mm") && error.contains("`e2_mm`"), "{error}");
     }
 
     #[test]
     fn a_key_of_another_kind_is_refused() {
-        let error = PairFile::parse("kind = \"constant\"\nratio = 2.0\nteeth = [3, 4]")
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("line 3") && error.contains("`teeth`") && error.contains("`ratio`"),
-            "{error}"
-        );
-        let error = PairFile::parse("kind = \"square\"")
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("\"square\"") && error.contains("\"elliptical\""),
-            "{error}"
-        );
+        let error = PairFile::parse("kind = \"constant\"\nratio = 2.0\nteeth = [3, 4]").unwrap_err().to_string();
+        assert!(error.contains("line 3") && error.contains("`teeth`") && error.contains("`ratio`"), "{error}");
+        let error = PairFile::parse("kind = \"square\"").unwrap_err().to_string();
+        assert!(error.contains("\"square\"") && error.contains("\"elliptical\""), "{error}");
         let error = PairFile::parse("module_mm = 3").unwrap_err().to_string();
         assert!(error.contains("`teeth`"), "{error}");
     }
 
     #[test]
     fn numbers_that_are_no_numbers_are_refused() {
-        for text in [
-            "module_mm = \"3\"",
-            "module_mm = ",
-            "teeth = [47]",
-            "teeth = [-1, 3]",
-        ] {
-            assert!(
-                matches!(
-                    PairFile::parse(text),
-                    Err(PairFileError::Syntax { line: 1, .. })
-                ),
-                "{text}"
-            );
+        for text in ["module_mm = \"3\"", "module_mm = ", "teeth = [47]", "teeth = [-1, 3]"] {
+            assert!(matches!(PairFile::parse(text), Err(PairFileError::Syntax { line: 1, .. })), "{text}");
         }
         let text = "module_mm = nan\nteeth = [47, 47]\neccentricity = 0.1";
         let error = PairFile::parse(text).unwrap().model().unwrap_err();
-        assert!(matches!(
-            error,
-            GeometryError::NotFinite {
-                quantity: "module_mm",
-                ..
-            }
-        ));
+        assert!(matches!(error, GeometryError::NotFinite { quantity: "module_mm", .. }));
     }
 }

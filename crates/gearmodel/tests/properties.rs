@@ -1,22 +1,16 @@
 //! Limits and symmetries that hold for every pair, and refusals of every invalid one.
 
+#![allow(clippy::unwrap_used)] // helpers of tests may
+
 use std::f64::consts::{PI, TAU};
 
 use gearmodel::increment::common_normal;
-use gearmodel::{
-    CircularSpec, Direction, EllipticalSpec, Errors, GearPair, NominalModel, PairFile,
-};
+use gearmodel::{CircularSpec, Direction, EllipticalSpec, Errors, GearPair, NominalModel, PairFile};
 use proptest::prelude::*;
 
 fn any_pair() -> impl Strategy<Value = GearPair> {
-    (
-        0.0..0.85_f64,
-        17_u32..80,
-        0.5..8.0_f64,
-        14.5..25.0_f64,
-        0.0..0.3_f64,
-    )
-        .prop_map(|(k, teeth, module, alpha, backlash)| {
+    (0.0..0.85_f64, 17_u32..80, 0.5..8.0_f64, 14.5..25.0_f64, 0.0..0.3_f64).prop_map(
+        |(k, teeth, module, alpha, backlash)| {
             GearPair::elliptical(&EllipticalSpec {
                 module_mm: module,
                 teeth: (teeth, teeth),
@@ -26,30 +20,22 @@ fn any_pair() -> impl Strategy<Value = GearPair> {
                 ..Default::default()
             })
             .unwrap()
-        })
+        },
+    )
 }
 
 fn any_errors() -> impl Strategy<Value = Errors> {
-    (
-        0.0..0.1_f64,
-        -PI..PI,
-        0.0..0.1_f64,
-        -PI..PI,
-        0.0..1e-4_f64,
-        0.0..1e-4_f64,
-        0.0..1e-2_f64,
+    (0.0..0.1_f64, -PI..PI, 0.0..0.1_f64, -PI..PI, 0.0..1e-4_f64, 0.0..1e-4_f64, 0.0..1e-2_f64).prop_map(
+        |(e1_mm, phi1_rad, e2_mm, phi2_rad, output, input, mesh)| Errors {
+            e1_mm,
+            phi1_rad,
+            e2_mm,
+            phi2_rad,
+            shaft_compliance_output_rad_per_nm: output,
+            shaft_compliance_input_rad_per_nm: input,
+            mesh_compliance_mm2_rad_per_nm: mesh,
+        },
     )
-        .prop_map(
-            |(e1_mm, phi1_rad, e2_mm, phi2_rad, output, input, mesh)| Errors {
-                e1_mm,
-                phi1_rad,
-                e2_mm,
-                phi2_rad,
-                shaft_compliance_output_rad_per_nm: output,
-                shaft_compliance_input_rad_per_nm: input,
-                mesh_compliance_mm2_rad_per_nm: mesh,
-            },
-        )
 }
 
 /// Numbers that break things.
@@ -73,14 +59,7 @@ fn any_number() -> impl Strategy<Value = f64> {
 fn assert_finite(pair: &GearPair) {
     for theta1 in [-10.0, -PI, 0.0, 0.1, 1.0, PI, TAU, 1e4] {
         let at = pair.at(theta1);
-        for value in [
-            at.theta2_rad,
-            at.ratio,
-            at.r1_mm,
-            at.r2_mm,
-            at.mu_rad,
-            pair.arc_length_mm(theta1),
-        ] {
+        for value in [at.theta2_rad, at.ratio, at.r1_mm, at.r2_mm, at.mu_rad, pair.arc_length_mm(theta1)] {
             assert!(value.is_finite(), "{pair:?} at {theta1}: {at:?}");
         }
         for direction in Direction::BOTH {

@@ -33,12 +33,7 @@ pub fn driven_base_arm_mm(pair: &GearPair, at: &MeshPoint, direction: Direction)
 /// TE_ccw = [e1 sin(u + (α−μ)) + e2 sin(v − (α−μ))]/(r2 cos(α−μ)),
 /// TE_cw = [e1 sin(u − (α+μ)) + e2 sin(v + (α+μ))]/(r2 cos(α+μ)).
 #[must_use]
-pub fn eccentricity_te_rad(
-    pair: &GearPair,
-    errors: &Errors,
-    at: &MeshPoint,
-    direction: Direction,
-) -> f64 {
+pub fn eccentricity_te_rad(pair: &GearPair, errors: &Errors, at: &MeshPoint, direction: Direction) -> f64 {
     let angle = direction.sign() * effective_pressure_angle_rad(pair, at, direction);
     let u = at.theta1_rad + errors.phi1_rad;
     let v = at.theta2_rad + errors.phi2_rad;
@@ -50,12 +45,7 @@ pub fn eccentricity_te_rad(
 ///
 /// A centre distance grown by Δa is δ = (−Δa, 0).
 #[must_use]
-pub fn displacement_te_rad(
-    pair: &GearPair,
-    at: &MeshPoint,
-    (dx_mm, dy_mm): (f64, f64),
-    direction: Direction,
-) -> f64 {
+pub fn displacement_te_rad(pair: &GearPair, at: &MeshPoint, (dx_mm, dy_mm): (f64, f64), direction: Direction) -> f64 {
     let angle = effective_pressure_angle_rad(pair, at, direction);
     (direction.sign() * dx_mm * angle.tan() + dy_mm) / at.r2_mm
 }
@@ -72,15 +62,13 @@ pub fn designed_backlash_te_rad(pair: &GearPair, at: &MeshPoint, direction: Dire
 #[must_use]
 pub fn te_rad(pair: &GearPair, errors: &Errors, theta1_rad: f64, direction: Direction) -> f64 {
     let at = pair.at(theta1_rad);
-    eccentricity_te_rad(pair, errors, &at, direction)
-        + designed_backlash_te_rad(pair, &at, direction)
+    eccentricity_te_rad(pair, errors, &at, direction) + designed_backlash_te_rad(pair, &at, direction)
 }
 
 /// Backlash at θ1, rad at the driven shaft, designed and periodic: TE_cw − TE_ccw.
 #[must_use]
 pub fn backlash_rad(pair: &GearPair, errors: &Errors, theta1_rad: f64) -> f64 {
-    te_rad(pair, errors, theta1_rad, Direction::Cw)
-        - te_rad(pair, errors, theta1_rad, Direction::Ccw)
+    te_rad(pair, errors, theta1_rad, Direction::Cw) - te_rad(pair, errors, theta1_rad, Direction::Ccw)
 }
 
 /// The periodic part alone in closed form, rad:

@@ -20,8 +20,7 @@ pub fn te_rad(pair: &GearPair, errors: &Errors, theta1_rad: f64, direction: Dire
     let line = |e_mm: f64, theta_rad: f64, phi_rad: f64| {
         e_mm * (sign * (theta_rad + phi_rad - alpha).sin() - (phi_rad - alpha).sin())
     };
-    (line(errors.e1_mm, theta1_rad, errors.phi1_rad)
-        + line(errors.e2_mm, at.theta2_rad, errors.phi2_rad))
+    (line(errors.e1_mm, theta1_rad, errors.phi1_rad) + line(errors.e2_mm, at.theta2_rad, errors.phi2_rad))
         / base_radius_mm
 }
 
@@ -31,6 +30,5 @@ pub fn backlash_rad(pair: &GearPair, errors: &Errors, theta1_rad: f64) -> f64 {
     let at = pair.at(theta1_rad);
     let alpha = pair.pressure_angle_rad();
     2.0 * alpha.tan() / (at.r1_mm * alpha.cos())
-        * (errors.e2_mm * (at.theta2_rad + errors.phi2_rad).cos()
-            - errors.e1_mm * (theta1_rad + errors.phi1_rad).cos())
+        * (errors.e2_mm * (at.theta2_rad + errors.phi2_rad).cos() - errors.e1_mm * (theta1_rad + errors.phi1_rad).cos())
 }

@@ -27,35 +27,20 @@ impl BacklashCurve {
     pub fn of(ccw: &Curve, cw: &Curve) -> Result<Self, MeasureError> {
         let (bins_ccw, bins_cw) = (ccw.values_rad.len(), cw.values_rad.len());
         if bins_ccw != bins_cw {
-            return Err(MeasureError::GridMismatch {
-                ccw: bins_ccw,
-                cw: bins_cw,
-            });
+            return Err(MeasureError::GridMismatch { ccw: bins_ccw, cw: bins_cw });
         }
-        let values_rad = cw
-            .values_rad
-            .iter()
-            .zip(&ccw.values_rad)
-            .map(|(cw, ccw)| cw - ccw)
-            .collect();
+        let values_rad = cw.values_rad.iter().zip(&ccw.values_rad).map(|(cw, ccw)| cw - ccw).collect();
         Ok(Self::from_curve(Curve { values_rad }))
     }
 
     /// Backlash that the model predicts under a load.
     #[must_use]
     pub fn predicted(model: &NominalModel, grid: AngleGrid, load_nm: f64) -> Self {
-        Self::from_curve(Curve::from_fn(grid, |theta1_rad| {
-            model.backlash_rad(theta1_rad, load_nm)
-        }))
+        Self::from_curve(Curve::from_fn(grid, |theta1_rad| model.backlash_rad(theta1_rad, load_nm)))
     }
 
     fn from_curve(curve: Curve) -> Self {
-        Self {
-            min_rad: curve.min_rad(),
-            mean_rad: curve.mean_rad(),
-            max_rad: curve.max_rad(),
-            curve,
-        }
+        Self { min_rad: curve.min_rad(), mean_rad: curve.mean_rad(), max_rad: curve.max_rad(), curve }
     }
 
     /// Feeds every value in order (NaN as the one canonical NaN): equal sequences mean bit-identical results.
@@ -72,23 +57,11 @@ mod tests {
 
     #[test]
     fn difference_of_the_senses_with_gaps() {
-        let ccw = Curve {
-            values_rad: vec![1.0, f64::NAN, 3.0],
-        };
-        let cw = Curve {
-            values_rad: vec![2.0, 5.0, 7.0],
-        };
+        let ccw = Curve { values_rad: vec![1.0, f64::NAN, 3.0] };
+        let cw = Curve { values_rad: vec![2.0, 5.0, 7.0] };
         let backlash = BacklashCurve::of(&ccw, &cw).unwrap();
-        assert_eq!(
-            (backlash.min_rad, backlash.mean_rad, backlash.max_rad),
-            (1.0, 2.5, 4.0)
-        );
-        let short = Curve {
-            values_rad: vec![0.0],
-        };
-        assert_eq!(
-            BacklashCurve::of(&ccw, &short),
-            Err(MeasureError::GridMismatch { ccw: 3, cw: 1 })
-        );
+        assert_eq!((backlash.min_rad, backlash.mean_rad, backlash.max_rad), (1.0, 2.5, 4.0));
+        let short = Curve { values_rad: vec![0.0] };
+        assert_eq!(BacklashCurve::of(&ccw, &short), Err(MeasureError::GridMismatch { ccw: 3, cw: 1 }));
     }
 }

@@ -54,30 +54,19 @@ pub struct RunFigures {
 /// with equal weight. NaN where nothing was measured.
 #[must_use]
 pub fn common_zero(runs: &[&RunTe], model: &NominalModel) -> f64 {
-    mean(
-        runs.iter()
-            .map(|run| difference(run, &run.mean_curve(), model).mean_rad())
-            .filter(|zero| zero.is_finite()),
-    )
+    mean(runs.iter().map(|run| difference(run, &run.mean_curve(), model).mean_rad()).filter(|zero| zero.is_finite()))
 }
 
 /// Measured − predicted at the bin centres, rad.
 fn difference(run: &RunTe, measured: &Curve, model: &NominalModel) -> Curve {
     let predicted = predicted_curve(run, model);
-    let values_rad = measured
-        .values_rad
-        .iter()
-        .zip(&predicted.values_rad)
-        .map(|(m, p)| m - p)
-        .collect();
+    let values_rad = measured.values_rad.iter().zip(&predicted.values_rad).map(|(m, p)| m - p).collect();
     Curve { values_rad }
 }
 
 fn predicted_curve(run: &RunTe, model: &NominalModel) -> Curve {
     let conditions = run.conditions();
-    Curve::from_fn(run.grid(), |theta1_rad| {
-        model.te_rad(theta1_rad, conditions.direction, conditions.load_nm)
-    })
+    Curve::from_fn(run.grid(), |theta1_rad| model.te_rad(theta1_rad, conditions.direction, conditions.load_nm))
 }
 
 impl RunFigures {
@@ -90,8 +79,7 @@ impl RunFigures {
         let predicted = predicted_curve(run, model);
         let difference = difference(run, &curve, model);
         let zero_rad = zero_rad.unwrap_or_else(|| difference.mean_rad());
-        let residual_rms_rad =
-            mean(difference.finite().map(|value| (value - zero_rad).powi(2))).sqrt();
+        let residual_rms_rad = mean(difference.finite().map(|value| (value - zero_rad).powi(2))).sqrt();
         let predicted_where_seen = Curve {
             values_rad: predicted
                 .values_rad
@@ -127,10 +115,7 @@ fn floor_rms(revolutions: &[(usize, Curve)]) -> f64 {
     let Some((_, first)) = revolutions.first() else {
         return f64::NAN;
     };
-    let means: Vec<f64> = revolutions
-        .iter()
-        .map(|(_, curve)| curve.mean_rad())
-        .collect();
+    let means: Vec<f64> = revolutions.iter().map(|(_, curve)| curve.mean_rad()).collect();
     let variance_of_mean = |bin: usize| {
         let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
         for ((_, curve), mean_rad) in revolutions.iter().zip(&means) {
@@ -143,12 +128,7 @@ fn floor_rms(revolutions: &[(usize, Curve)]) -> f64 {
         }
         (squares - sum * sum / count).max(0.0) / ((count - 1.0) * count)
     };
-    mean(
-        (0..first.values_rad.len())
-            .map(variance_of_mean)
-            .filter(|value| value.is_finite()),
-    )
-    .sqrt()
+    mean((0..first.values_rad.len()).map(variance_of_mean).filter(|value| value.is_finite())).sqrt()
 }
 
 /// Least-squares slope of the revolutions' means over their number, rad a revolution.
@@ -161,10 +141,7 @@ fn slope(revolutions: &[(usize, Curve)]) -> f64 {
     if points.len() < 2 {
         return f64::NAN;
     }
-    let (mean_x, mean_y) = (
-        mean(points.iter().map(|p| p.0)),
-        mean(points.iter().map(|p| p.1)),
-    );
+    let (mean_x, mean_y) = (mean(points.iter().map(|p| p.0)), mean(points.iter().map(|p| p.1)));
     let (mut xy, mut xx) = (0.0, 0.0);
     for (x, y) in points {
         xy += (x - mean_x) * (y - mean_y);
@@ -180,10 +157,7 @@ fn tooth_to_tooth(grid: AngleGrid, curve: &Curve, pair: &GearPair) -> f64 {
     };
     let bins = grid.bins();
     let perimeter_mm = pair.perimeter_mm();
-    let arcs_mm: Vec<f64> = grid
-        .centres()
-        .map(|theta1_rad| pair.arc_length_mm(theta1_rad))
-        .collect();
+    let arcs_mm: Vec<f64> = grid.centres().map(|theta1_rad| pair.arc_length_mm(theta1_rad)).collect();
     let mut largest = f64::NAN;
     for start in 0..bins {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -199,8 +173,8 @@ fn tooth_to_tooth(grid: AngleGrid, curve: &Curve, pair: &GearPair) -> f64 {
             if arc_mm > pitch_mm {
                 // The window ends between two bins: interpolate, so that coarse grids lose nothing.
                 if let Some((arc_before, value_before)) = previous {
-                    let at_end = value_before
-                        + (value - value_before) * (pitch_mm - arc_before) / (arc_mm - arc_before);
+                    let at_end =
+                        value_before + (value - value_before) * (pitch_mm - arc_before) / (arc_mm - arc_before);
                     low = low.min(at_end);
                     high = high.max(at_end);
                 }

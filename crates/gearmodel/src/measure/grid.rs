@@ -28,11 +28,7 @@ impl AngleGrid {
     /// [`MeasureError::Bins`] outside 8 to 2²⁰ bins.
     pub fn new(bins: usize) -> Result<Self, MeasureError> {
         let (lower, upper) = (Self::MIN_BINS, Self::MAX_BINS);
-        if (lower..=upper).contains(&bins) {
-            Ok(Self { bins })
-        } else {
-            Err(MeasureError::Bins { bins, lower, upper })
-        }
+        if (lower..=upper).contains(&bins) { Ok(Self { bins }) } else { Err(MeasureError::Bins { bins, lower, upper }) }
     }
 
     /// Bins a turn.
@@ -88,27 +84,18 @@ pub struct Curve {
 impl Curve {
     /// A curve from a function of θ1 at the bin centres.
     pub fn from_fn(grid: AngleGrid, value_rad: impl Fn(f64) -> f64) -> Self {
-        Self {
-            values_rad: grid.centres().map(value_rad).collect(),
-        }
+        Self { values_rad: grid.centres().map(value_rad).collect() }
     }
 
     /// The values that are there, rad.
     pub fn finite(&self) -> impl Iterator<Item = f64> {
-        self.values_rad
-            .iter()
-            .copied()
-            .filter(|value| value.is_finite())
+        self.values_rad.iter().copied().filter(|value| value.is_finite())
     }
 
     /// Share of the bins that hold a value, 0 to 1.
     #[must_use]
     pub fn coverage(&self) -> f64 {
-        if self.values_rad.is_empty() {
-            0.0
-        } else {
-            self.finite().count() as f64 / self.values_rad.len() as f64
-        }
+        if self.values_rad.is_empty() { 0.0 } else { self.finite().count() as f64 / self.values_rad.len() as f64 }
     }
 
     /// Mean over the bins, rad; NaN when no bin was seen.
@@ -171,16 +158,9 @@ mod tests {
 
     #[test]
     fn statistics_skip_unseen_bins() {
-        let curve = Curve {
-            values_rad: vec![1.0, f64::NAN, 3.0],
-        };
-        assert_eq!(
-            (curve.mean_rad(), curve.pp_rad(), curve.rms_rad()),
-            (2.0, 2.0, 5.0_f64.sqrt())
-        );
-        let empty = Curve {
-            values_rad: vec![f64::NAN],
-        };
+        let curve = Curve { values_rad: vec![1.0, f64::NAN, 3.0] };
+        assert_eq!((curve.mean_rad(), curve.pp_rad(), curve.rms_rad()), (2.0, 2.0, 5.0_f64.sqrt()));
+        let empty = Curve { values_rad: vec![f64::NAN] };
         assert!(empty.mean_rad().is_nan() && empty.pp_rad().is_nan() && empty.rms_rad().is_nan());
     }
 }

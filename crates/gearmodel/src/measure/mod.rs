@@ -29,9 +29,7 @@ pub enum MeasureError {
         upper: usize,
     },
     /// Two curves on different grids.
-    #[error(
-        "curves of {ccw} (ccw) and {cw} (cw) bins a turn cannot be subtracted: analyse both on one grid"
-    )]
+    #[error("curves of {ccw} (ccw) and {cw} (cw) bins a turn cannot be subtracted: analyse both on one grid")]
     GridMismatch {
         /// Bins of the ccw curve.
         ccw: usize,

@@ -23,11 +23,8 @@ impl Order {
     #[must_use]
     pub fn of(grid: AngleGrid, curve: &Curve, highest: u32) -> Vec<Self> {
         let unknowns = 1 + 2 * highest as usize;
-        let seen: Vec<(f64, f64)> = grid
-            .centres()
-            .zip(curve.values_rad.iter().copied())
-            .filter(|(_, value)| value.is_finite())
-            .collect();
+        let seen: Vec<(f64, f64)> =
+            grid.centres().zip(curve.values_rad.iter().copied()).filter(|(_, value)| value.is_finite()).collect();
         if seen.len() < unknowns {
             return Vec::new();
         }
@@ -53,11 +50,7 @@ impl Order {
             .map(|order| {
                 let column = 2 * order as usize - 1;
                 let (cos, sin) = (solution[column], solution[column + 1]);
-                Self {
-                    order,
-                    amplitude_rad: cos.hypot(sin),
-                    phase_rad: sin.atan2(cos),
-                }
+                Self { order, amplitude_rad: cos.hypot(sin), phase_rad: sin.atan2(cos) }
             })
             .collect()
     }
@@ -70,9 +63,7 @@ mod tests {
     #[test]
     fn orders_of_a_known_curve_with_and_without_gaps() {
         let grid = AngleGrid::default();
-        let mut curve = Curve::from_fn(grid, |theta| {
-            5.0 + 3.0 * (theta - 0.4).cos() + 0.5 * (3.0 * theta + 1.0).cos()
-        });
+        let mut curve = Curve::from_fn(grid, |theta| 5.0 + 3.0 * (theta - 0.4).cos() + 0.5 * (3.0 * theta + 1.0).cos());
         for gap in [0, 100] {
             curve.values_rad[..gap].fill(f64::NAN);
             let orders = Order::of(grid, &curve, 4);

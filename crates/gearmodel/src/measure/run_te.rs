@@ -103,11 +103,7 @@ impl RunTe {
         }
         self.samples += 1;
         let bin = self.grid.unwrapped_bin_of(theta1_rad);
-        let opened = if bin == self.last_bin {
-            None
-        } else {
-            self.enter(bin, theta1_rad, theta2_rad, te_rad)
-        };
+        let opened = if bin == self.last_bin { None } else { self.enter(bin, theta1_rad, theta2_rad, te_rad) };
         let centre_rad = (bin as f64 + 0.5) * self.grid.width_rad();
         let sum = &mut self.revolutions[self.last_revolution].bins[self.last_wrapped];
         sum.count += 1;
@@ -117,18 +113,8 @@ impl RunTe {
     }
 
     /// Moves on to another bin than that of the last sample.
-    fn enter(
-        &mut self,
-        bin: i64,
-        theta1_rad: f64,
-        theta2_rad: f64,
-        te_rad: f64,
-    ) -> Option<TePoint> {
-        let sense = if self.conditions.direction == Direction::Ccw {
-            1
-        } else {
-            -1
-        };
+    fn enter(&mut self, bin: i64, theta1_rad: f64, theta2_rad: f64, te_rad: f64) -> Option<TePoint> {
+        let sense = if self.conditions.direction == Direction::Ccw { 1 } else { -1 };
         let is_first = self.revolutions.is_empty();
         if is_first {
             self.te_origin_rad = te_rad;
@@ -144,23 +130,14 @@ impl RunTe {
             return None;
         }
         self.furthest_bin = travelled;
-        let point = TePoint {
-            bin: self.last_wrapped,
-            revolution: number,
-            theta1_rad,
-            theta2_rad,
-            te_rad,
-        };
+        let point = TePoint { bin: self.last_wrapped, revolution: number, theta1_rad, theta2_rad, te_rad };
         self.points.push(point);
         Some(point)
     }
 
     /// Index of a revolution's sums, made when it is new.
     fn revolution_slot(&mut self, number: i32) -> usize {
-        match self
-            .revolutions
-            .binary_search_by_key(&number, |revolution| revolution.number)
-        {
+        match self.revolutions.binary_search_by_key(&number, |revolution| revolution.number) {
             Ok(slot) => slot,
             Err(slot) => {
                 let bins = vec![BinSum::default(); self.grid.bins()].into_boxed_slice();
@@ -197,11 +174,7 @@ impl RunTe {
     /// Whole revolutions: those whose last bin the run has reached.
     #[must_use]
     pub fn revolutions(&self) -> usize {
-        if self.revolutions.is_empty() {
-            0
-        } else {
-            (self.furthest_bin as usize + 1) / self.grid.bins()
-        }
+        if self.revolutions.is_empty() { 0 } else { (self.furthest_bin as usize + 1) / self.grid.bins() }
     }
 
     /// All points emitted so far, in order.
@@ -213,16 +186,12 @@ impl RunTe {
     /// TE over one revolution, rad: bin means at bin centres. A revolution that was not touched is all NaN.
     #[must_use]
     pub fn revolution_curve(&self, revolution: usize) -> Curve {
-        let found = i32::try_from(revolution).ok().and_then(|number| {
-            self.revolutions
-                .binary_search_by_key(&number, |revolution| revolution.number)
-                .ok()
-        });
+        let found = i32::try_from(revolution)
+            .ok()
+            .and_then(|number| self.revolutions.binary_search_by_key(&number, |revolution| revolution.number).ok());
         match found {
             Some(slot) => self.curve_of(&self.revolutions[slot].bins),
-            None => Curve {
-                values_rad: vec![f64::NAN; self.grid.bins()],
-            },
+            None => Curve { values_rad: vec![f64::NAN; self.grid.bins()] },
         }
     }
 
@@ -230,9 +199,7 @@ impl RunTe {
     pub fn whole_revolutions(&self) -> impl Iterator<Item = (usize, Curve)> {
         let whole = self.revolutions();
         self.revolutions.iter().filter_map(move |revolution| {
-            let number = usize::try_from(revolution.number)
-                .ok()
-                .filter(|number| *number < whole)?;
+            let number = usize::try_from(revolution.number).ok().filter(|number| *number < whole)?;
             Some((number, self.curve_of(&revolution.bins)))
         })
     }
@@ -249,17 +216,8 @@ impl RunTe {
             return self.curve_of(&only.bins);
         }
         let curves: Vec<Curve> = self.whole_revolutions().map(|(_, curve)| curve).collect();
-        let at_bin = |bin: usize| {
-            mean(
-                curves
-                    .iter()
-                    .map(|curve| curve.values_rad[bin])
-                    .filter(|v| v.is_finite()),
-            )
-        };
-        Curve {
-            values_rad: (0..self.grid.bins()).map(at_bin).collect(),
-        }
+        let at_bin = |bin: usize| mean(curves.iter().map(|curve| curve.values_rad[bin]).filter(|v| v.is_finite()));
+        Curve { values_rad: (0..self.grid.bins()).map(at_bin).collect() }
     }
 
     /// Feeds every value of the run's result in order: TE of the points, then the curves of the whole revolutions (NaN as
@@ -295,10 +253,8 @@ impl RunTe {
             let Some((offset_rad, te_rad)) = means[bin] else {
                 return f64::NAN;
             };
-            let before =
-                means[if bin == 0 { last } else { bin - 1 }].map(|(x, te)| (x - width_rad, te));
-            let after =
-                means[if bin == last { 0 } else { bin + 1 }].map(|(x, te)| (x + width_rad, te));
+            let before = means[if bin == 0 { last } else { bin - 1 }].map(|(x, te)| (x - width_rad, te));
+            let after = means[if bin == last { 0 } else { bin + 1 }].map(|(x, te)| (x + width_rad, te));
             let (from, to) = match (before, after) {
                 (Some(before), Some(after)) => (before, after),
                 (Some(before), None) => (before, (offset_rad, te_rad)),
@@ -307,16 +263,10 @@ impl RunTe {
             };
             // Neighbouring means are at least apart by what their bins allow; a vanishing distance has no slope to give.
             let distance_rad = to.0 - from.0;
-            let slope = if distance_rad > 1e-3 * width_rad {
-                (to.1 - from.1) / distance_rad
-            } else {
-                0.0
-            };
+            let slope = if distance_rad > 1e-3 * width_rad { (to.1 - from.1) / distance_rad } else { 0.0 };
             self.te_origin_rad + te_rad - slope * offset_rad
         };
-        Curve {
-            values_rad: (0..means.len()).map(value).collect(),
-        }
+        Curve { values_rad: (0..means.len()).map(value).collect() }
     }
 }
 
@@ -328,11 +278,7 @@ mod tests {
     use crate::EllipticalSpec;
 
     fn conditions(direction: Direction) -> RunConditions {
-        RunConditions {
-            direction,
-            load_nm: 10.0,
-            speed_rpm: 5.0,
-        }
+        RunConditions { direction, load_nm: 10.0, speed_rpm: 5.0 }
     }
 
     fn pair() -> GearPair {
@@ -340,13 +286,7 @@ mod tests {
     }
 
     /// A run of `revolutions` from `start`, `per_turn` samples a turn, with TE given by a function of θ1.
-    fn run(
-        direction: Direction,
-        start: f64,
-        revolutions: f64,
-        per_turn: u32,
-        te: impl Fn(f64) -> f64,
-    ) -> RunTe {
+    fn run(direction: Direction, start: f64, revolutions: f64, per_turn: u32, te: impl Fn(f64) -> f64) -> RunTe {
         let pair = pair();
         let mut run = RunTe::new(AngleGrid::default(), conditions(direction));
         let count = (revolutions * f64::from(per_turn)) as u32;

@@ -41,11 +41,7 @@ impl PitchCurve for Circle {
 
     #[inline]
     fn motion(&self, theta1_rad: f64) -> Motion {
-        Motion {
-            theta2_rad: self.theta2(theta1_rad),
-            ratio: self.driver / self.driven,
-            ratio_slope: 0.0,
-        }
+        Motion { theta2_rad: self.theta2(theta1_rad), ratio: self.driver / self.driven, ratio_slope: 0.0 }
     }
 
     fn ratio_curvature(&self, _theta1_rad: f64) -> f64 {

@@ -6,7 +6,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Motion, PitchCurve};
+use super::{Motion, PitchCurve, Roll};
 
 /// Largest eccentricity k that the model accepts; the ratio then swings 199 : 1.
 pub(crate) const MAX_ECCENTRICITY: f64 = 0.99;
@@ -37,12 +37,7 @@ impl Ellipse {
     pub(crate) fn new(k: f64) -> Self {
         let q = k / (1.0 + (1.0 - k * k).sqrt());
         let (arc_mean, arc_sines) = arc_series(k);
-        Self {
-            k,
-            q,
-            arc_mean,
-            arc_sines,
-        }
+        Self { k, q, arc_mean, arc_sines }
     }
 
     /// Eccentricity k.
@@ -68,11 +63,7 @@ fn arc_series(k: f64) -> (f64, Vec<f64>) {
     let k_complement = (1.0 - k * k).sqrt();
     let decay = (1.0 - k_complement) / (1.0 + k_complement);
     // exp(−38) = 3e-17; decay = 0 for a circle, where ln is −∞ and the count 0
-    let terms = if decay > 0.0 {
-        (-38.0 / decay.ln()).ceil() as usize + 1
-    } else {
-        0
-    };
+    let terms = if decay > 0.0 { (-38.0 / decay.ln()).ceil() as usize + 1 } else { 0 };
     let nodes = 2 * (terms + 1);
     let speed: Vec<f64> = (0..nodes)
         .map(|j| {
@@ -83,11 +74,8 @@ fn arc_series(k: f64) -> (f64, Vec<f64>) {
     let mean = speed.iter().sum::<f64>() / nodes as f64;
     let sines = (1..=terms)
         .map(|n| {
-            let sum: f64 = speed
-                .iter()
-                .enumerate()
-                .map(|(j, v)| v * (TAU * ((n * j) % nodes) as f64 / nodes as f64).cos())
-                .sum();
+            let sum: f64 =
+                speed.iter().enumerate().map(|(j, v)| v * (TAU * ((n * j) % nodes) as f64 / nodes as f64).cos()).sum();
             // cosine coefficient 2/N Σ, integrated: /(2n)
             sum / (nodes as f64 * n as f64)
         })
@@ -135,15 +123,25 @@ impl PitchCurve for Ellipse {
         -2.0 * k * ratio * (cos * denominator - 4.0 * k * sin * sin) / (denominator * denominator)
     }
 
+    #[inline]
+    fn roll(&self, theta1_rad: f64) -> Roll {
+        // One sine and cosine of θ1 for everything.
+        let (k, q) = (self.k, self.q);
+        let (sin, cos) = theta1_rad.sin_cos();
+        let inverse = 1.0 / (1.0 - 2.0 * k * cos + k * k);
+        let ratio = (1.0 - k * k) * inverse;
+        let motion = Motion {
+            theta2_rad: theta1_rad + 2.0 * (k * sin / (1.0 - k * cos)).atan(),
+            ratio,
+            ratio_slope: -2.0 * k * sin * ratio * inverse,
+        };
+        let ratio_curvature = -2.0 * k * ratio * (cos - 4.0 * k * sin * sin * inverse) * inverse;
+        let anomaly_rad = theta1_rad + 2.0 * (q * sin / (1.0 - q * cos)).atan();
+        Roll { motion, ratio_curvature, arc: self.arc_at_anomaly(anomaly_rad) }
+    }
+
     fn arc(&self, theta1_rad: f64) -> f64 {
-        let anomaly_rad = moebius(self.q, theta1_rad);
-        // Clenshaw for Σ b_n sin(n x), x = 2E
-        let (sin, cos) = (2.0 * anomaly_rad).sin_cos();
-        let (mut b1, mut b2) = (0.0, 0.0);
-        for &coefficient in self.arc_sines.iter().rev() {
-            (b1, b2) = (coefficient + 2.0 * cos * b1 - b2, b1);
-        }
-        self.arc_mean * anomaly_rad + b1 * sin
+        self.arc_at_anomaly(moebius(self.q, theta1_rad))
     }
 
     fn radius_range(&self) -> (f64, f64) {
@@ -153,6 +151,20 @@ impl PitchCurve for Ellipse {
     fn max_inclination(&self) -> (f64, f64) {
         // tan μ = −k sin θ/(1 − k cos θ) is largest at cos θ = k, where |μ| = asin k
         (self.k.asin(), self.k.acos())
+    }
+}
+
+impl Ellipse {
+    /// Arc length from the eccentric anomaly E, in centre distances.
+    #[inline]
+    fn arc_at_anomaly(&self, anomaly_rad: f64) -> f64 {
+        // Clenshaw for Σ b_n sin(n x), x = 2E
+        let (sin, cos) = (2.0 * anomaly_rad).sin_cos();
+        let (mut b1, mut b2) = (0.0, 0.0);
+        for &coefficient in self.arc_sines.iter().rev() {
+            (b1, b2) = (coefficient + 2.0 * cos * b1 - b2, b1);
+        }
+        self.arc_mean * anomaly_rad + b1 * sin
     }
 }
 
@@ -170,26 +182,17 @@ mod tests {
             let speed = |theta: f64| {
                 let motion = ellipse.motion(theta);
                 let r = motion.ratio / (1.0 + motion.ratio);
-                r * (1.0 + (motion.ratio_slope / (motion.ratio * (1.0 + motion.ratio))).powi(2))
-                    .sqrt()
+                r * (1.0 + (motion.ratio_slope / (motion.ratio * (1.0 + motion.ratio))).powi(2)).sqrt()
             };
             let h = end / f64::from(steps);
             let sum: f64 = (0..=steps)
                 .map(|j| {
-                    let weight = if j == 0 || j == steps {
-                        1.0
-                    } else {
-                        2.0 + 2.0 * f64::from(j % 2)
-                    };
+                    let weight = if j == 0 || j == steps { 1.0 } else { 2.0 + 2.0 * f64::from(j % 2) };
                     weight * speed(f64::from(j) * h)
                 })
                 .sum();
             let expected = sum * h / 3.0;
-            assert!(
-                (ellipse.arc(end) / expected - 1.0).abs() < 1e-11,
-                "k = {k}: {} {expected}",
-                ellipse.arc(end)
-            );
+            assert!((ellipse.arc(end) / expected - 1.0).abs() < 1e-11, "k = {k}: {} {expected}", ellipse.arc(end));
         }
     }
 
@@ -199,11 +202,7 @@ mod tests {
         let h = 1e-5;
         for j in 0..40 {
             let theta = 0.2 * f64::from(j);
-            let (below, here, above) = (
-                ellipse.motion(theta - h),
-                ellipse.motion(theta),
-                ellipse.motion(theta + h),
-            );
+            let (below, here, above) = (ellipse.motion(theta - h), ellipse.motion(theta), ellipse.motion(theta + h));
             assert!(((above.theta2_rad - below.theta2_rad) / (2.0 * h) - here.ratio).abs() < 1e-7);
             assert!(((above.ratio - below.ratio) / (2.0 * h) - here.ratio_slope).abs() < 1e-6);
             let curvature = (above.ratio_slope - below.ratio_slope) / (2.0 * h);

@@ -23,6 +23,17 @@ pub struct Motion {
     pub ratio_slope: f64,
 }
 
+/// A [`Motion`] with what rack generation needs besides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Roll {
+    /// Angle, ratio and its slope.
+    pub motion: Motion,
+    /// d²i21/dθ1², 1/rad².
+    pub ratio_curvature: f64,
+    /// Arc length of gear 1's curve from θ1 = 0, in centre distances.
+    pub arc: f64,
+}
+
 /// The transmission of a closed pair of pitch curves at unit centre distance.
 pub trait PitchCurve {
     /// Name as in `kind` of `pair.toml`.
@@ -45,6 +56,16 @@ pub trait PitchCurve {
 
     /// Arc length of gear 1's curve from θ1 = 0, in centre distances, unwrapped.
     fn arc(&self, theta1_rad: f64) -> f64;
+
+    /// Motion, curvature and arc length at once.
+    #[inline]
+    fn roll(&self, theta1_rad: f64) -> Roll {
+        Roll {
+            motion: self.motion(theta1_rad),
+            ratio_curvature: self.ratio_curvature(theta1_rad),
+            arc: self.arc(theta1_rad),
+        }
+    }
 
     /// i21(θ1).
     #[inline]
@@ -91,6 +112,10 @@ macro_rules! pitch_curves {
             }
             fn arc(&self, theta1_rad: f64) -> f64 {
                 match self { $(Self::$variant(curve) => curve.arc(theta1_rad)),+ }
+            }
+            #[inline]
+            fn roll(&self, theta1_rad: f64) -> Roll {
+                match self { $(Self::$variant(curve) => curve.roll(theta1_rad)),+ }
             }
             fn radius_range(&self) -> (f64, f64) {
                 match self { $(Self::$variant(curve) => curve.radius_range()),+ }
