@@ -25,8 +25,8 @@ pub struct EncoderSpec {
     pub noise_rad: f64,
 }
 
-/// What an encoder of the rig is unless said otherwise: 18000 lines interpolated 400-fold.
 impl EncoderSpec {
+    /// An encoder of the rig unless said otherwise: 18000 lines interpolated 400-fold, a perfect disc.
     fn with_noise(noise_rad: f64) -> Self {
         Self {
             lines: 18_000,

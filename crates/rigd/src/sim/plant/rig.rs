@@ -146,13 +146,15 @@ impl Plant {
         self.servo.set_step(self.step_s);
         self.brake.set_step(self.step_s);
         let skew_s = self.spec.encoders.time_skew_s;
-        self.skew = (skew_s != 0.0).then(|| Delay::new(skew_s.abs(), self.step_s, self.early_angle_rad()));
+        let early = self.early_shaft();
+        self.skew =
+            (skew_s != 0.0).then(|| Delay::new(skew_s.abs(), self.step_s, self.chain.q[early], self.chain.v[early]));
         Ok(())
     }
 
-    /// Angle of the shaft that is latched early: the input for a positive skew.
-    fn early_angle_rad(&self) -> f64 {
-        if self.spec.encoders.time_skew_s > 0.0 { self.chain.q[INPUT] } else { self.chain.q[DISC] }
+    /// The shaft that is latched early: the input for a positive skew.
+    fn early_shaft(&self) -> usize {
+        if self.spec.encoders.time_skew_s > 0.0 { INPUT } else { DISC }
     }
 
     /// Advances the rig by exactly one sample period and latches both counters.
@@ -198,11 +200,9 @@ impl Plant {
         if let Some(loss) = &mut self.count_loss {
             self.output.lose(loss.advance(travel_rad));
         }
-        if self.skew.is_some() {
-            let angle_rad = self.early_angle_rad();
-            if let Some(skew) = &mut self.skew {
-                skew.push(angle_rad);
-            }
+        let early = self.early_shaft();
+        if let Some(skew) = &mut self.skew {
+            skew.push(self.chain.q[early]);
         }
     }
 

@@ -22,6 +22,8 @@ pub struct DriveSpec {
     pub inertia_kg_m2: f64,
     /// Rated torque of the motor, N·m.
     pub rated_torque_nm: f64,
+    /// Highest speed of the motor, rpm; the drive follows no reference beyond it.
+    pub max_speed_rpm: f64,
     /// Torque limit of the drive in parts of the rated torque.
     pub torque_limit_ratio: f64,
     /// Bandwidth of the speed loop, Hz.
@@ -42,6 +44,7 @@ impl Default for DriveSpec {
             reduction: 20.0,
             inertia_kg_m2: 0.05,
             rated_torque_nm: 2.39,
+            max_speed_rpm: 5000.0,
             torque_limit_ratio: 3.0,
             bandwidth_hz: 40.0,
             tuned_inertia_kg_m2: 0.08,
@@ -57,6 +60,7 @@ impl DriveSpec {
         in_range("drive.reduction", self.reduction, "", (0.1, 1000.0), "motor turns per driver turn")?;
         in_range("drive.inertia_kg_m2", self.inertia_kg_m2, "kg·m²", (1e-4, 100.0), "at the driver shaft")?;
         in_range("drive.rated_torque_nm", self.rated_torque_nm, "N·m", (1e-3, 1e4), "at the motor shaft")?;
+        in_range("drive.max_speed_rpm", self.max_speed_rpm, "rpm", (1.0, 20_000.0), "of the motor")?;
         in_range("drive.torque_limit_ratio", self.torque_limit_ratio, "", (0.01, 10.0), "3 means 300 % of rated")?;
         in_range(
             "drive.bandwidth_hz",
@@ -86,6 +90,7 @@ impl DriveSpec {
 /// The running drive.
 #[derive(Debug, Clone)]
 pub(super) struct Servo {
+    max_speed_rpm: f64,
     rated_torque_nm: f64,
     torque_limit_nm: f64,
     proportional_nm_s_per_rad: f64,
@@ -128,6 +133,7 @@ impl Servo {
             })
             .collect();
         Self {
+            max_speed_rpm: spec.max_speed_rpm,
             rated_torque_nm: spec.rated_torque_nm * spec.reduction,
             torque_limit_nm: spec.rated_torque_nm * spec.reduction * spec.torque_limit_ratio,
             proportional_nm_s_per_rad: proportional,
@@ -174,7 +180,7 @@ impl Servo {
 
     pub fn set_speed_reference_rpm(&mut self, motor_rpm: f64) {
         if motor_rpm.is_finite() {
-            self.reference_rpm = motor_rpm;
+            self.reference_rpm = motor_rpm.clamp(-self.max_speed_rpm, self.max_speed_rpm);
         }
     }
 
@@ -337,6 +343,15 @@ mod tests {
         speed = 0.0;
         run(&mut servo, &mut speed, 20.0, 1.0);
         assert!((servo.speed_rpm() - 100.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn no_reference_exceeds_the_motor() {
+        let mut servo = servo(1e-4);
+        servo.set_speed_reference_rpm(1e9);
+        assert_eq!(servo.reference_rpm, 5000.0);
+        servo.set_speed_reference_rpm(f64::NAN);
+        assert_eq!(servo.reference_rpm, 5000.0);
     }
 
     #[test]

@@ -10,11 +10,14 @@ pub(super) struct Delay {
 }
 
 impl Delay {
-    /// A delay of `delay_s`, in steps of `dt_s`, of a shaft that stands at `angle_rad`.
-    pub fn new(delay_s: f64, dt_s: f64, angle_rad: f64) -> Self {
+    /// A delay of `delay_s`, in steps of `dt_s`, of a shaft that stands at `angle_rad` and has been turning steadily.
+    pub fn new(delay_s: f64, dt_s: f64, angle_rad: f64, speed_rad_per_s: f64) -> Self {
         let steps = delay_s / dt_s;
         let steps_back = steps.floor() as usize;
-        Self { angles: vec![angle_rad; steps_back + 2], newest: 0, steps_back, fraction: steps - steps_back as f64 }
+        let count = steps_back + 2;
+        // The newest angle is the last of the ring.
+        let past = (0..count).map(|n| angle_rad - speed_rad_per_s * dt_s * (count - 1 - n) as f64).collect();
+        Self { angles: past, newest: count - 1, steps_back, fraction: steps - steps_back as f64 }
     }
 
     /// Notes the angle at the end of a step.
@@ -41,7 +44,8 @@ mod tests {
     #[test]
     fn the_angle_is_that_of_one_delay_ago() {
         for delay in [0.0, 0.4e-3, 1e-3, 3.7e-3] {
-            let mut shaft = Delay::new(delay, 1e-3, 0.0);
+            let mut shaft = Delay::new(delay, 1e-3, 0.0, 1.0);
+            assert!((shaft.angle_rad() + delay).abs() < 1e-12, "{delay}");
             for n in 1..50 {
                 shaft.push(f64::from(n) * 1e-3);
             }

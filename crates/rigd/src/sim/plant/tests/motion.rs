@@ -135,6 +135,27 @@ fn the_same_rig_at_every_sample_rate() {
 }
 
 #[test]
+fn the_step_is_short_enough() {
+    // The same drive with a tenth of the step: the shafts agree in time, TE in the angle.
+    let spec = PlantSpec::default().quiet();
+    for driver_rpm in [5.0, 20.0, 60.0] {
+        let (mut coarse, mut fine) = (turning(&spec, driver_rpm, 0.4), turning(&spec, driver_rpm, 0.4));
+        fine.set_sample_rate_hz(100e3).unwrap();
+        for _ in 0..50 {
+            (0..400).for_each(|_| _ = coarse.step());
+            (0..4000).for_each(|_| _ = fine.step());
+            let (a, b) = (coarse.truth(), fine.truth());
+            let elastic = |plant: &Plant, truth: &Truth| {
+                truth.transmission_error_rad - plant.rigid_error_rad(truth.angles_rad[0], Flank::Ccw)
+            };
+            let (te, finer) = (elastic(&coarse, &a), elastic(&fine, &b));
+            assert!((te - finer).abs() < 1e-7 + 1e-3 * te.abs(), "{driver_rpm} rpm: {te} {finer}");
+            assert!((a.angles_rad[0] - b.angles_rad[0]).abs() < 1e-4, "{driver_rpm} rpm");
+        }
+    }
+}
+
+#[test]
 fn the_clock_counts_samples_exactly() {
     let mut plant = Plant::new(&PlantSpec::default(), 10_000.0, 1).unwrap();
     for _ in 0..30_000 {

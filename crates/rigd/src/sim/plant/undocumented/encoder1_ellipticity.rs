@@ -2,7 +2,7 @@
 
 use super::super::PlantSpec;
 
-/// Squeezes the disc to half axes that differ by 3e-5 of their mean, twice.
+/// Squeezes the disc: (b − a)/(b + a) of its half axes becomes 3e-5.
 pub fn apply(spec: &mut PlantSpec) {
     spec.encoders.input.ellipticity = 3e-5;
     spec.encoders.input.ellipticity_phase_rad = 0.8;
