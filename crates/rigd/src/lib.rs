@@ -1,1 +1,20 @@
-//! rigd
+//! The rig's daemon: drives servo and brake, records both encoders without losing a sample, and computes live transmission
+//! error and backlash.
+//!
+//! Reading order: [`cli`] (what a person asks for) → [`run`] (a session from connecting to the finalised log) → [`device`]
+//! (drivers) over [`link`] (bytes) → [`analysis`] (TE and backlash, the same for live and replay) → [`summary`], [`plot`].
+//! [`sim`] is the rig as a simulation that answers the same bytes.
+
+pub mod analysis;
+pub mod cli;
+pub mod clock;
+pub mod device;
+pub mod link;
+pub mod plot;
+pub mod present;
+pub mod profile;
+pub mod quantity;
+pub mod replay;
+pub mod run;
+pub mod sim;
+pub mod summary;

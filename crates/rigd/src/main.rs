@@ -1,2 +1,7 @@
-//! rigd
-fn main() {}
+//! `rigd`: see `rigd --help`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    rigd::cli::main()
+}

@@ -1,0 +1,87 @@
+//! Inputs that several commands take: the gear pair and the senses.
+
+use std::path::{Path, PathBuf};
+
+use gearmodel::{Direction, GeometryError, NominalModel, PairFile, PairFileError};
+use thiserror::Error;
+
+use crate::profile::DEFAULT_PAIR;
+
+/// Why a gear pair is refused.
+#[derive(Debug, Error)]
+pub enum PairError {
+    /// The file could not be read.
+    #[error("pair {path}: {source}; give a pair.toml, or leave --pair out for the built-in pair")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's reason.
+        source: std::io::Error,
+    },
+    /// The text is not a pair.
+    #[error("pair {path}: {source}")]
+    Text {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: PairFileError,
+    },
+    /// Such a pair cannot run.
+    #[error("pair {path}: {source}")]
+    Geometry {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: GeometryError,
+    },
+}
+
+/// Reads `path`, or takes the built-in pair; the text is kept for the log.
+///
+/// # Errors
+/// [`PairError`] names the file, the key and the limit.
+pub fn pair(path: Option<&Path>) -> Result<(String, NominalModel), PairError> {
+    let (text, path) = match path {
+        None => (DEFAULT_PAIR.to_owned(), Path::new("(built in)")),
+        Some(path) => {
+            let text = std::fs::read_to_string(path).map_err(|source| PairError::Read { path: path.into(), source })?;
+            (text, path)
+        }
+    };
+    let model = parse(&text, path)?;
+    Ok((text, model))
+}
+
+/// A nominal model from the text of a `pair.toml`; `path` is for the error.
+///
+/// # Errors
+/// [`PairError`].
+pub fn parse(text: &str, path: &Path) -> Result<NominalModel, PairError> {
+    PairFile::parse(text)
+        .map_err(|source| PairError::Text { path: path.into(), source })?
+        .model()
+        .map_err(|source| PairError::Geometry { path: path.into(), source })
+}
+
+/// Senses in the order in which they are run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Directions {
+    /// Counter-clockwise alone.
+    Ccw,
+    /// Clockwise alone.
+    Cw,
+    /// Counter-clockwise, then clockwise.
+    Both,
+}
+
+impl Directions {
+    /// As a list.
+    #[must_use]
+    pub fn list(self) -> Vec<Direction> {
+        match self {
+            Self::Ccw => vec![Direction::Ccw],
+            Self::Cw => vec![Direction::Cw],
+            Self::Both => vec![Direction::Ccw, Direction::Cw],
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! The command line. One command is one file; here they are only routed.
+
+mod info;
+mod input;
+mod replay;
+mod run;
+mod sim;
+mod stop;
+
+pub use input::PairError;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// How a command ended, as its exit code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// Done.
+    Done = 0,
+    /// Failed: the reason is the last lines on stderr.
+    Failed = 1,
+    /// Bad usage or bad input; nothing was moved or written.
+    BadInput = 2,
+    /// Done, but the data is incomplete.
+    Incomplete = 3,
+    /// Stopped by the operator, log finalised.
+    Stopped = 4,
+    /// Stopped by a limit, a fault or a lost device, log finalised.
+    Halted = 5,
+}
+
+const EXIT_CODES: &str = "Exit codes:
+  0  done
+  1  failed: the reason is the last lines on stderr
+  2  bad usage or bad input, nothing was moved or written
+  3  done, but the data is incomplete (loss, gap, truncated log)
+  4  stopped by the operator, log finalised
+  5  stopped by a limit, a fault or a lost device, log finalised";
+
+/// Measures transmission error and backlash of gears, above all non-circular ones.
+#[derive(Debug, Parser)]
+#[command(name = "rigd", version, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Drive the rig, record a log, and compute TE and backlash
+    Run(Box<run::Args>),
+    /// Recompute TE and backlash from logs
+    Replay(replay::Args),
+    /// Say what is in a log
+    Info(info::Args),
+    /// Start the simulated rig in real time, on ports of its own
+    Sim(sim::Args),
+    /// End a run from another terminal, as Ctrl-C does
+    Stop(stop::Args),
+}
+
+/// Parses the command line and runs the command.
+#[must_use]
+pub fn main() -> ExitCode {
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_env_filter(
+            tracing_subscriber::EnvFilter::builder()
+                .with_default_directive(tracing::level_filters::LevelFilter::WARN.into())
+                .from_env_lossy(),
+        )
+        .without_time()
+        .init();
+    let exit = match Cli::parse().command {
+        Command::Run(args) => run::main(&args),
+        Command::Replay(args) => replay::main(&args),
+        Command::Info(args) => info::main(&args),
+        Command::Sim(args) => sim::main(&args),
+        Command::Stop(args) => stop::main(&args),
+    };
+    ExitCode::from(exit as u8)
+}
+
+/// Prints an error with its causes and gives the exit code back.
+
+
+fn fail(exit: Exit, error: &dyn std::error::Error) -> Exit {
+    eprintln!("error: {error}");
+    let said = error.to_string();
+    let mut cause = error.source();
+    while let Some(reason) = cause {
+        let text = reason.to_string();
+        if !said.contains(&text) {
+            eprintln!("  because: {text}");
+        }
+        cause = reason.source();
+    }
+    exit
+}
+
+/// Prints to stdout; a reader that closed the pipe is not an error.
+fn print(text: &str) {
+    use std::io::Write as _;
+    let _ = writeln!(std::io::stdout(), "{text}");
+}

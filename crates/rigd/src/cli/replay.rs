@@ -1,0 +1,77 @@
+//! `rigd replay`: recompute TE and backlash from logs.
+
+use std::path::{Path, PathBuf};
+
+use super::{Exit, fail, input, print};
+use crate::analysis::Analysis;
+use crate::replay::{self, ReplayError};
+use crate::summary::{Origin, Summary};
+
+/// Recompute TE and backlash from logs.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The logs, in their order
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// `1` for real time, `2` for twice that, `max` for as fast as it goes
+    #[arg(long, default_value = "max", value_parser = speed)]
+    speed: Speed,
+    /// The gear pair [default: the one in the first log]
+    #[arg(long, value_name = "FILE")]
+    pair: Option<PathBuf>,
+    /// One JSON object on stdout, nothing else
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Speed(Option<f64>);
+
+fn speed(text: &str) -> Result<Speed, String> {
+    if text == "max" {
+        return Ok(Speed(None));
+    }
+    match text.parse::<f64>() {
+        Ok(speed) if speed.is_finite() && speed > 0.0 => Ok(Speed(Some(speed))),
+        _ => Err("a speed is a number > 0 (1 is real time), or max".into()),
+    }
+}
+
+/// Runs the command.
+pub fn main(args: &Args) -> Exit {
+    match run(args) {
+        Ok(exit) => exit,
+        Err(error) => fail(Exit::BadInput, error.as_ref()),
+    }
+}
+
+fn run(args: &Args) -> Result<Exit, Box<dyn std::error::Error>> {
+    let first = &args.logs[0];
+    let (pair_in_log, backend) = replay::head(first).map_err(ReplayError::Log)?;
+    let model = match &args.pair {
+        Some(path) => input::pair(Some(path))?.1,
+        None => {
+            let text = pair_in_log.ok_or_else(|| ReplayError::NoPair { path: first.clone() })?;
+            input::parse(&text, Path::new("pair.toml")).map_err(|source| ReplayError::Pair { path: first.clone(), source })?
+        }
+    };
+    let mut analysis = Analysis::new(model);
+    let replayed = replay::replay(&args.logs, &mut analysis, args.speed.0)?;
+    let summary = Summary::of(&analysis, Origin {
+        schema: "rigd.replay/1",
+        log: args.logs.iter().map(|path| path.display().to_string()).collect(),
+        backend,
+        losses: replayed.losses,
+        ended: "done".into(),
+        warnings: replayed.incomplete.clone(),
+    });
+    if args.json {
+        print(&serde_json::to_string_pretty(&summary)?);
+    } else {
+        print(summary.text().trim_start_matches('\n'));
+    }
+    for line in &replayed.incomplete {
+        eprintln!("warning: {line}");
+    }
+    Ok(if replayed.incomplete.is_empty() { Exit::Done } else { Exit::Incomplete })
+}

@@ -1,0 +1,403 @@
+//! `rigd run`: drive the rig, record, and compute TE and backlash.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use riglog::LogError;
+use tokio::task::LocalSet;
+
+use super::input::{self, Directions};
+use super::{Exit, fail, print, stop};
+use crate::clock::Clock;
+use crate::profile::Profile;
+use crate::quantity::{RATE, SPEED, TORQUE};
+use crate::run::Plan;
+use crate::run::rig::slip_power_w;
+use crate::run::session::{self, Links, Outcome, Setup};
+use crate::run::stop::StopRequests;
+use crate::summary::{Origin, Summary};
+use crate::{plot, sim};
+
+/// Slower slip than this makes powder brakes stick and slip, rpm.
+const STICK_SLIP_RPM: f64 = 10.0;
+
+/// Drive the rig, record a log, and compute TE and backlash.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Load at the driven gear: 10Nm, 5Nm,10Nm or 5..15Nm:5
+    #[arg(long, value_name = "TORQUE", value_parser = loads)]
+    load: Loads,
+    /// Speed of the driver: 5 or 5rpm
+    #[arg(long, value_name = "RPM", value_parser = |text: &str| SPEED.parse(text))]
+    rpm: f64,
+    /// Senses of rotation, in this order
+    #[arg(long, value_enum, default_value = "both")]
+    direction: Directions,
+    /// Whole revolutions of the driver to record in each sense
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    revs: u32,
+    /// Sampling of both encoders
+    #[arg(long, value_name = "RATE", default_value = "10kHz", value_parser = |text: &str| RATE.parse(text))]
+    rate: f64,
+    /// The gear pair and its documented errors [default: the built-in pair]
+    #[arg(long, value_name = "FILE")]
+    pair: Option<PathBuf>,
+    /// A model that `rigd diagnose --write-model` saved, in place of --pair
+    #[arg(long, value_name = "FILE", conflicts_with = "pair")]
+    model: Option<PathBuf>,
+    /// The rig [default: the simulated rig]
+    #[arg(long, value_name = "FILE")]
+    profile: Option<PathBuf>,
+    /// Directory of the logs
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    out: PathBuf,
+    /// Seed of the simulated rig [default: 1]
+    #[arg(long, conflicts_with = "profile")]
+    seed: Option<u64>,
+    /// Simulated rig: `max` runs as fast as it can, `1` in real time over pseudo-terminals [default: max]
+    #[arg(long, value_enum, conflicts_with = "profile")]
+    time_scale: Option<TimeScale>,
+    /// Simulated rig: an effect that the model does not know; may be repeated. `list` names them
+    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',', conflicts_with = "profile")]
+    undocumented: Vec<String>,
+    /// Who runs it, for the log
+    #[arg(long, default_value = "")]
+    operator: String,
+    /// What it is for, for the log
+    #[arg(long, default_value = "")]
+    note: String,
+    /// One JSON object on stdout, nothing else
+    #[arg(long)]
+    json: bool,
+    /// No progress line
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Debug, Clone)]
+struct Loads(Vec<f64>);
+
+fn loads(text: &str) -> Result<Loads, crate::quantity::QuantityError> {
+    TORQUE.parse_list(text).map(Loads)
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum TimeScale {
+    #[value(name = "1")]
+    Real,
+    Max,
+}
+
+/// What is refused before anything is opened, moved or written.
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    #[error("{option} {value} {unit} is over the limit {limit} {unit} ({key} in profile '{profile}'); lower it, or raise the limit if the rig allows it")]
+    OverLimit { option: &'static str, value: f64, unit: &'static str, limit: f64, key: &'static str, profile: String },
+    #[error("--load {load_nm} N·m is beyond the brake's calibrated curve or its current limit {limit_a} A (brake.rising, brake.current_limit_a in profile '{profile}'); lower the load, or calibrate further")]
+    BeyondBrake { load_nm: f64, limit_a: f64, profile: String },
+    #[error("--load {load_nm} N·m at --rpm {speed_rpm} makes {power_w:.0} W of heat in the brake, over its {limit_w} W (limits.slip_power_w in profile '{profile}'); lower load or speed")]
+    TooHot { load_nm: f64, speed_rpm: f64, power_w: f64, limit_w: f64, profile: String },
+    #[error("--rate {rate_hz} Hz does not fit the clock of a counter: use 10 Hz to 1 MHz")]
+    Rate { rate_hz: f64 },
+    #[error("--undocumented '{name}' is not an effect of the simulated rig; it has: {known}")]
+    Effect { name: String, known: String },
+    #[error("profile '{profile}' mixes port \"sim\" with real ports; all three devices are simulated, or none")]
+    MixedPorts { profile: String },
+}
+
+/// Runs the command.
+pub fn main(args: &Args) -> Exit {
+    if args.undocumented.iter().any(|name| name == "list") {
+        print(&sim::describe_undocumented());
+        return Exit::Done;
+    }
+    let (setup, spec) = match prepare(args) {
+        Ok(prepared) => prepared,
+        Err(error) => return fail(Exit::BadInput, error.as_ref()),
+    };
+    if let Err(error) = std::fs::create_dir_all(&args.out) {
+        eprintln!("error: --out {}: {error}; name a directory that you may write", args.out.display());
+        return Exit::BadInput;
+    }
+    recover(&args.out);
+    if !args.json {
+        announce(args, &setup);
+    }
+    let running = stop::Running::register();
+    let exit = execute(args, setup, spec);
+    drop(running);
+    exit
+}
+
+fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::error::Error>> {
+    let profile = match &args.profile {
+        Some(path) => Profile::load(path)?,
+        None => Profile::simulated(),
+    };
+    session::check_drivers(&profile)?;
+    let (pair_toml, model) = input::pair(args.model.as_deref().or(args.pair.as_deref()))?;
+    let plan = Plan {
+        directions: args.direction.list(),
+        loads_nm: args.load.0.clone(),
+        speed_rpm: args.rpm,
+        revolutions: f64::from(args.revs),
+        rate_hz: args.rate,
+    };
+    refuse(&profile, &plan)?;
+    if let Some(name) = args.undocumented.iter().find(|name| !sim::is_undocumented(name)) {
+        return Err(Box::new(Refusal::Effect { name: name.clone(), known: sim::undocumented_names().join(", ") }));
+    }
+    let simulated = [&profile.servo.port, &profile.brake.port, &profile.counter.port].iter().filter(|port| port.as_str() == "sim").count();
+    if simulated == 1 || simulated == 2 {
+        return Err(Box::new(Refusal::MixedPorts { profile: profile.name }));
+    }
+    // The simulated rig's gears are those of the pair, with its documented errors and what is left undocumented.
+    let spec = if profile.in_process() { Some(sim::spec(&model, &args.undocumented)?) } else { None };
+    let setup = Setup {
+        path: session::log_path(&args.out, &plan),
+        plan,
+        profile,
+        model,
+        pair_toml,
+        operator: args.operator.clone(),
+        note: args.note.clone(),
+        quiet: args.quiet,
+    };
+    Ok((setup, spec))
+}
+
+fn refuse(profile: &Profile, plan: &Plan) -> Result<(), Refusal> {
+    let (limits, name) = (&profile.limits, &profile.name);
+    let over = |option, value: f64, unit, limit: f64, key| {
+        if value <= limit { Ok(()) } else { Err(Refusal::OverLimit { option, value, unit, limit, key, profile: name.clone() }) }
+    };
+    over("--rpm", plan.speed_rpm, "rpm", limits.speed_rpm, "limits.speed_rpm")?;
+    for &load_nm in &plan.loads_nm {
+        over("--load", load_nm, "N·m", limits.load_nm, "limits.load_nm")?;
+        if profile.brake.current_a(load_nm).is_none() {
+            return Err(Refusal::BeyondBrake { load_nm, limit_a: profile.brake.current_limit_a, profile: name.clone() });
+        }
+        let power_w = slip_power_w(load_nm, plan.speed_rpm);
+        if power_w > limits.slip_power_w {
+            return Err(Refusal::TooHot { load_nm, speed_rpm: plan.speed_rpm, power_w, limit_w: limits.slip_power_w, profile: name.clone() });
+        }
+    }
+    if !(10.0..=1e6).contains(&plan.rate_hz) {
+        return Err(Refusal::Rate { rate_hz: plan.rate_hz });
+    }
+    Ok(())
+}
+
+/// Finalises what an earlier, killed run left behind.
+fn recover(directory: &Path) {
+    match riglog::recover_directory(directory) {
+        Ok(logs) => {
+            for (path, outcome) in logs {
+                match outcome {
+                    Ok(log) if log.already_complete => {}
+                    Ok(log) => eprintln!(
+                        "recovered {}: {} messages kept, {} bytes of a cut chunk dropped",
+                        path.display(),
+                        log.kept_messages,
+                        log.dropped_bytes
+                    ),
+                    // Another run is writing it.
+                    Err(LogError::Locked { .. }) => {}
+                    Err(error) => eprintln!("warning: not recovered: {error}"),
+                }
+            }
+        }
+        Err(error) => eprintln!("warning: earlier logs were not checked: {error}"),
+    }
+}
+
+fn announce(args: &Args, setup: &Setup) {
+    let profile = &setup.profile;
+    if profile.name == "sim" {
+        let how = if args.time_scale == Some(TimeScale::Real) { "in real time" } else { "faster than real time" };
+        print(&format!("SIMULATED RIG, {how} (no --profile given): real registers and frames, emulated hardware"));
+    } else {
+        print(&format!("rig '{}'", profile.name));
+    }
+    for warning in warnings(setup) {
+        eprintln!("warning: {warning}");
+    }
+}
+
+/// What one should know before believing the numbers.
+fn warnings(setup: &Setup) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let slip = setup.plan.speed_rpm * setup.profile.brake.step_up;
+    if slip < STICK_SLIP_RPM {
+        warnings.push(format!(
+            "the brake slips at {slip} rpm; makers recommend {STICK_SLIP_RPM} rpm or more, below it the torque sticks and slips (a step-up before the brake, brake.step_up, helps)"
+        ));
+    }
+    let drag = setup.profile.brake.drag_nm();
+    for load in setup.plan.loads_nm.iter().filter(|load| **load < drag) {
+        warnings.push(format!("load {load} N·m is below the brake's drag of {drag} N·m; the drag remains"));
+    }
+    warnings
+}
+
+fn execute(args: &Args, setup: Setup, spec: Option<sim::PlantSpec>) -> Exit {
+    let seed = args.seed.unwrap_or(1);
+    match spec {
+        None => real(args, setup),
+        Some(_) if args.time_scale == Some(TimeScale::Real) => match Simulator::start(args, seed) {
+            Ok(simulator) => {
+                let profile = Profile { name: setup.profile.name.clone(), ..simulator.profile.clone() };
+                let exit = real(args, Setup { profile, ..setup });
+                drop(simulator);
+                exit
+            }
+            Err(error) => {
+                eprintln!("error: the simulated rig did not start: {error}");
+                Exit::Failed
+            }
+        },
+        Some(spec) => {
+            let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
+            in_runtime(runtime, args, setup, |plan| {
+                sim::start_in_process(&spec, plan.rate_hz, seed).map_err(|error| error.to_string())
+            }, Clock::simulated)
+        }
+    }
+}
+
+fn real(args: &Args, setup: Setup) -> Exit {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    in_runtime(runtime, args, setup, |_| Ok(Links::default()), Clock::real)
+}
+
+fn in_runtime(
+    runtime: std::io::Result<tokio::runtime::Runtime>,
+    args: &Args,
+    setup: Setup,
+    links: impl FnOnce(&Plan) -> Result<Links, String>,
+    clock: impl FnOnce() -> Clock,
+) -> Exit {
+    let runtime = match runtime {
+        Ok(runtime) => runtime,
+        Err(error) => return fail(Exit::Failed, &error),
+    };
+    let path = setup.path.clone();
+    let backend = setup.profile.name.clone();
+    let warnings = warnings(&setup);
+    let outcome = LocalSet::new().block_on(&runtime, async move {
+        let stop = StopRequests::listen().map_err(|error| format!("signals: {error}"))?;
+        let links = links(&setup.plan)?;
+        session::run(setup, links, clock(), stop).await.map_err(|error| error.to_string())
+    });
+    match outcome {
+        Err(error) => {
+            eprintln!("error: {error}");
+            Exit::Failed
+        }
+        Ok(outcome) => conclude(args, &path, backend, warnings, &outcome),
+    }
+}
+
+/// Summary, picture and exit code.
+fn conclude(args: &Args, path: &Path, backend: String, warnings: Vec<String>, outcome: &Outcome) -> Exit {
+    use crate::run::halt::Halt;
+    let origin = Origin {
+        schema: "rigd.run/1",
+        log: vec![path.display().to_string()],
+        backend,
+        losses: outcome.lost + outcome.unwritten,
+        ended: outcome.halt.as_ref().map_or_else(|| "done".into(), ToString::to_string),
+        warnings: warnings.into_iter().chain(outcome.troubles.iter().cloned()).collect(),
+    };
+    let mut summary = Summary::of(&outcome.analysis, origin);
+    let picture = path.with_extension("svg");
+    match plot::draw(&outcome.analysis, &picture) {
+        Ok(true) => summary.plot = Some(picture.display().to_string()),
+        Ok(false) => {}
+        Err(error) => eprintln!("warning: {error}"),
+    }
+    if args.json {
+        match serde_json::to_string_pretty(&summary) {
+            Ok(json) => print(&json),
+            Err(error) => return fail(Exit::Failed, &error),
+        }
+    } else {
+        print(summary.text().trim_start_matches('\n'));
+    }
+    for trouble in &outcome.troubles {
+        eprintln!("error: {trouble}");
+    }
+    match &outcome.halt {
+        None if summary.losses > 0 => {
+            eprintln!("error: {} samples never arrived or were not written; see /rig/events in the log", summary.losses);
+            Exit::Incomplete
+        }
+        None if !outcome.troubles.is_empty() => Exit::Halted,
+        None => Exit::Done,
+        Some(halt @ Halt::Operator) => {
+            eprintln!("{halt}; the log is finalised: {}", path.display());
+            Exit::Stopped
+        }
+        Some(halt) => fail(Exit::Halted, halt),
+    }
+}
+
+/// `rigd sim` as a process of its own, ended when dropped.
+struct Simulator {
+    process: Child,
+    directory: PathBuf,
+    profile: Profile,
+}
+
+impl Simulator {
+    fn start(args: &Args, seed: u64) -> Result<Self, String> {
+        use std::io::{BufRead as _, BufReader};
+        use std::os::unix::process::CommandExt as _;
+        let directory = std::env::temp_dir().join(format!("rigd-sim-{}", std::process::id()));
+        let program = std::env::current_exe().map_err(|error| error.to_string())?;
+        let mut command = Command::new(program);
+        command.arg("sim").arg("--pty-dir").arg(&directory).arg("--seed").arg(seed.to_string());
+        if let Some(pair) = args.model.as_ref().or(args.pair.as_ref()) {
+            command.arg("--pair").arg(pair);
+        }
+        for name in &args.undocumented {
+            command.arg("--undocumented").arg(name);
+        }
+        // A group of its own: Ctrl-C stops the run, and only then the rig.
+        command.process_group(0).stdin(Stdio::null()).stdout(Stdio::piped());
+        let mut process = command.spawn().map_err(|error| error.to_string())?;
+        let ready = process.stdout.take().is_some_and(|output| {
+            BufReader::new(output).lines().map_while(Result::ok).any(|line| line == "ready")
+        });
+        let profile = if ready { Profile::load(&directory.join("profile.toml")).map_err(|error| error.to_string()) } else { Err("it ended before it was ready".into()) };
+        match profile {
+            Ok(profile) => Ok(Self { process, directory, profile }),
+            Err(error) => {
+                end(&mut process);
+                Err(error)
+            }
+        }
+    }
+}
+
+/// Asks the process to end, then makes it.
+fn end(process: &mut Child) {
+    let pid = nix::unistd::Pid::from_raw(process.id() as i32);
+    let _ = nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM);
+    for _ in 0..50 {
+        if matches!(process.try_wait(), Ok(Some(_))) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let _ = process.kill();
+    let _ = process.wait();
+}
+
+impl Drop for Simulator {
+    fn drop(&mut self) {
+        end(&mut self.process);
+        let _ = std::fs::remove_dir_all(&self.directory);
+    }
+}

@@ -1,0 +1,58 @@
+//! `rigd sim`: the simulated rig in real time, as a process of its own.
+
+use std::path::PathBuf;
+
+use tokio::task::LocalSet;
+
+use super::{Exit, fail, input};
+use crate::profile::Profile;
+use crate::run::stop::StopRequests;
+use crate::sim;
+
+/// Start the simulated rig in real time, on ports of its own.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Directory of the ports and of profile.toml
+    #[arg(long, value_name = "DIR", default_value = "sim")]
+    pty_dir: PathBuf,
+    /// Seed of all noise and of the start position
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The gear pair [default: the built-in pair]
+    #[arg(long, value_name = "FILE")]
+    pair: Option<PathBuf>,
+    /// An effect that the model does not know; may be repeated
+    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
+    undocumented: Vec<String>,
+}
+
+/// Runs the command.
+pub fn main(args: &Args) -> Exit {
+    let spec = match input::pair(args.pair.as_deref()) {
+        Ok((_, model)) => sim::spec(&model, &args.undocumented),
+        Err(error) => return fail(Exit::BadInput, &error),
+    };
+    let spec = match spec {
+        Ok(spec) => spec,
+        Err(error) => return fail(Exit::BadInput, &error),
+    };
+    if let Err(error) = std::fs::create_dir_all(&args.pty_dir) {
+        eprintln!("error: --pty-dir {}: {error}; name a directory that you may write", args.pty_dir.display());
+        return Exit::BadInput;
+    }
+    let runtime = match tokio::runtime::Builder::new_current_thread().enable_all().build() {
+        Ok(runtime) => runtime,
+        Err(error) => return fail(Exit::Failed, &error),
+    };
+    let outcome = LocalSet::new().block_on(&runtime, async {
+        let stop = StopRequests::listen().map_err(|source| sim::SimError::Io { what: "signals".into(), source })?;
+        sim::serve_ptys(&spec, args.seed, &args.pty_dir, &Profile::simulated(), stop).await
+    });
+    match outcome {
+        Ok(()) => Exit::Done,
+        Err(error) => {
+            eprintln!("error: simulated rig in {}: {error}", args.pty_dir.display());
+            Exit::Failed
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! `rigd stop`: end a run from another terminal, as Ctrl-C does.
+//!
+//! A run leaves its process number in the user's runtime directory; the number is believed only while a lock on the file is held.
+
+use std::fs::{File, TryLockError};
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+
+use super::{Exit, print};
+
+/// End a run from another terminal, as Ctrl-C does.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+fn directory() -> PathBuf {
+    std::env::var_os("XDG_RUNTIME_DIR").map_or_else(
+        || std::env::temp_dir().join(format!("rigd-{}", nix::unistd::Uid::current())),
+        |runtime| PathBuf::from(runtime).join("rigd"),
+    )
+}
+
+/// This process's entry in the list of runs; gone when dropped.
+pub struct Running {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Running {
+    /// Enters this process; `None` when the directory cannot be written, and then `rigd stop` does not find it.
+    pub fn register() -> Option<Self> {
+        let directory = directory();
+        std::fs::create_dir_all(&directory).ok()?;
+        let path = directory.join(format!("{}.run", std::process::id()));
+        let mut file = File::create(&path).ok()?;
+        file.lock().ok()?;
+        file.write_all(std::process::id().to_string().as_bytes()).ok()?;
+        Some(Self { path, _lock: file })
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+/// Runs the command.
+pub fn main(_: &Args) -> Exit {
+    let entries = std::fs::read_dir(directory()).map(|entries| entries.flatten().collect::<Vec<_>>()).unwrap_or_default();
+    let mut stopped = 0;
+    for entry in entries {
+        let path = entry.path();
+        let Ok(file) = File::open(&path) else { continue };
+        if !matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            // Nobody holds it: the run died, and its number may be another's by now.
+            let _ = std::fs::remove_file(&path);
+            continue;
+        }
+        let pid = std::fs::read_to_string(&path).ok().and_then(|text| text.trim().parse().ok());
+        if let Some(pid) = pid.filter(|pid| kill(Pid::from_raw(*pid), Signal::SIGINT).is_ok()) {
+            print(&format!("stopping run {pid}"));
+            stopped += 1;
+        }
+    }
+    if stopped == 0 {
+        eprintln!("error: no run of this user is under way");
+        return Exit::BadInput;
+    }
+    Exit::Done
+}

@@ -1,0 +1,223 @@
+//! Devices by what they do. One device is one file and one line in its list.
+
+pub mod asda_b2;
+pub mod bus;
+pub mod counter_box;
+pub mod rd60xx;
+
+use std::time::Duration;
+
+use async_trait::async_trait;
+use thiserror::Error;
+use wire::counter_box::Samples;
+
+use crate::link::{Address, Link};
+use crate::profile::{BrakeProfile, CounterProfile, ServoProfile};
+pub use bus::BusError;
+
+/// Who a device says it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identity {
+    /// Model, serial number and firmware in words.
+    pub text: String,
+}
+
+/// What a servo says of itself.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ServoStatus {
+    /// Alarm code; 0 is none.
+    pub alarm: u16,
+    /// The drive holds the motor.
+    pub enabled: bool,
+    /// Motor speed, rpm.
+    pub motor_rpm: f64,
+}
+
+/// What a brake's driver says of itself.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct BrakeStatus {
+    /// Coil current, A.
+    pub current_a: f64,
+    /// Temperature of the driver, or of the brake where it has a sensor, °C.
+    pub temperature_c: f64,
+    /// A protection of the driver has tripped.
+    pub tripped: bool,
+    /// The output is on.
+    pub enabled: bool,
+}
+
+/// What a counter box says of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CounterIdentity {
+    /// Model, serial number and firmware in words.
+    pub text: String,
+    /// Counts a revolution of input and output encoder, after interpolation.
+    pub counts_per_rev: [u64; 2],
+    /// Lines of input and output encoder.
+    pub lines: [u32; 2],
+    /// Fastest sampling, Hz.
+    pub max_rate_hz: f64,
+}
+
+/// Why a device failed.
+#[derive(Debug, Error)]
+pub enum DeviceError {
+    /// On its Modbus line.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// It is not what the profile says.
+    #[error("{device} on {port}: {found} where the profile says {expected}; check the port and the profile's driver")]
+    Unexpected {
+        /// Which device.
+        device: &'static str,
+        /// Its port.
+        port: String,
+        /// What it says it is.
+        found: String,
+        /// What was expected.
+        expected: String,
+    },
+    /// A value is beyond what the device takes.
+    #[error("{device} on {port}: {quantity} = {value} {unit} is beyond the device's {limit} {unit}; lower it, or correct the profile")]
+    Range {
+        /// Which device.
+        device: &'static str,
+        /// Its port.
+        port: String,
+        /// Quantity.
+        quantity: &'static str,
+        /// Value asked for.
+        value: f64,
+        /// What the device takes.
+        limit: f64,
+        /// Unit of both.
+        unit: &'static str,
+    },
+    /// It does not do what it was told.
+    #[error("{device} on {port} did not reach '{state}' within {seconds} s; last status: {status}")]
+    NotReached {
+        /// Which device.
+        device: &'static str,
+        /// Its port.
+        port: String,
+        /// The state that was asked for.
+        state: &'static str,
+        /// How long was waited, s.
+        seconds: f64,
+        /// What it said last.
+        status: String,
+    },
+    /// The encoders' stream stopped.
+    #[error("counter on {port}: {what}; check power, cable and plug")]
+    Counter {
+        /// Its port.
+        port: String,
+        /// What happened.
+        what: String,
+    },
+    /// The servo has a fault of its own.
+    #[error("servo on {port}: {alarm}; remove the cause and reset the drive")]
+    Alarm {
+        /// Its port.
+        port: String,
+        /// The drive's code and its meaning.
+        alarm: String,
+    },
+    /// The servo has no watchdog of its own.
+    #[error("servo on {port}: register {register} (communication watchdog) reads back {read}, wanted {wanted}; without it the motor turns on when this program dies")]
+    NoWatchdog {
+        /// Its port.
+        port: String,
+        /// The parameter.
+        register: &'static str,
+        /// What it reads.
+        read: String,
+        /// What was written.
+        wanted: String,
+    },
+}
+
+/// A servo drive in speed mode.
+#[async_trait(?Send)]
+pub trait Servo {
+    /// Who it is.
+    async fn identify(&mut self) -> Result<Identity, DeviceError>;
+    /// Sets speed mode, ramps and the communication watchdog, and reads all of them back. The motor stays off.
+    async fn prepare(&mut self, accel_ms: f64, decel_ms: f64, lease: Duration) -> Result<(), DeviceError>;
+    /// The fastest that the drive allows, motor rpm, as read back.
+    async fn max_motor_rpm(&mut self) -> Result<f64, DeviceError>;
+    /// Holds or frees the motor.
+    async fn set_enabled(&mut self, enabled: bool) -> Result<(), DeviceError>;
+    /// Speed setpoint, motor rpm; the drive ramps to it.
+    async fn set_motor_rpm(&mut self, rpm: f64) -> Result<(), DeviceError>;
+    /// What it says of itself. Any transaction renews the lease.
+    async fn status(&mut self) -> Result<ServoStatus, DeviceError>;
+    /// What happened on its line.
+    fn statistics(&self) -> bus::BusStatistics;
+}
+
+/// A current source that drives the brake's coil.
+#[async_trait(?Send)]
+pub trait Brake {
+    /// Who it is.
+    async fn identify(&mut self) -> Result<Identity, DeviceError>;
+    /// The largest current of the device, A.
+    fn max_current_a(&self) -> f64;
+    /// Sets voltage limit and zero current, and switches the output on.
+    async fn prepare(&mut self, voltage_v: f64) -> Result<(), DeviceError>;
+    /// Coil current, A.
+    async fn set_current_a(&mut self, current_a: f64) -> Result<(), DeviceError>;
+    /// Zero current, output off.
+    async fn release(&mut self) -> Result<(), DeviceError>;
+    /// What it says of itself.
+    async fn status(&mut self) -> Result<BrakeStatus, DeviceError>;
+    /// What happened on its line.
+    fn statistics(&self) -> bus::BusStatistics;
+}
+
+/// A box that latches both encoders together.
+#[async_trait(?Send)]
+pub trait Counter {
+    /// Who it is.
+    async fn identify(&mut self) -> Result<CounterIdentity, DeviceError>;
+    /// Begins to stream.
+    async fn start(&mut self, rate_hz: f64) -> Result<(), DeviceError>;
+    /// The next batch. Dropping the future loses nothing.
+    async fn next(&mut self) -> Result<Samples, DeviceError>;
+    /// Ends the stream.
+    async fn stop(&mut self) -> Result<(), DeviceError>;
+    /// Frames that were damaged on the way.
+    fn damaged_frames(&self) -> u64;
+}
+
+type Factory<P, D> = fn(Link, Address, &P) -> D;
+
+/// Servo drives by their name in the profile.
+pub const SERVOS: &[(&str, Factory<ServoProfile, Box<dyn Servo>>)] = &[("asda-b2", asda_b2::open)];
+
+/// Brake drivers by their name in the profile.
+pub const BRAKES: &[(&str, Factory<BrakeProfile, Box<dyn Brake>>)] = &[("rd60xx", rd60xx::open)];
+
+/// Encoder readers by their name in the profile.
+pub const COUNTERS: &[(&str, Factory<CounterProfile, Box<dyn Counter>>)] = &[("counter-box", counter_box::open)];
+
+/// A driver's name that is in no list.
+#[derive(Debug, Error)]
+#[error("{device}: no driver '{name}'; this version has {known}")]
+pub struct UnknownDriver {
+    device: &'static str,
+    name: String,
+    known: String,
+}
+
+/// Finds a driver by its name in the profile.
+///
+/// # Errors
+/// [`UnknownDriver`] lists those that there are.
+pub fn find<F: Copy>(drivers: &[(&'static str, F)], device: &'static str, name: &str) -> Result<F, UnknownDriver> {
+    drivers.iter().find(|(known, _)| *known == name).map(|(_, factory)| *factory).ok_or_else(|| UnknownDriver {
+        device,
+        name: name.to_owned(),
+        known: drivers.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", "),
+    })
+}

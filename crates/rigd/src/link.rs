@@ -1,0 +1,139 @@
+//! A link carries bytes to and from one device: a serial line, a socket, or a pipe to an emulator in this process.
+
+use std::time::Duration;
+
+use thiserror::Error;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio_serial::{DataBits, Parity, SerialPort as _, SerialPortBuilderExt as _, SerialStream, StopBits};
+
+/// Anything that carries bytes both ways.
+pub trait Duplex: AsyncRead + AsyncWrite + Unpin {}
+impl<T: AsyncRead + AsyncWrite + Unpin> Duplex for T {}
+
+/// A link to one device.
+pub type Link = Box<dyn Duplex>;
+
+/// Where a device is and how its line is set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Address {
+    /// Which device, for messages.
+    pub device: &'static str,
+    /// Path or `tcp://host:port`.
+    pub port: String,
+    /// Line speed, bit/s.
+    pub baud: u32,
+    /// Character format, for instance `8N2`.
+    pub format: String,
+}
+
+/// Why a link could not be opened.
+#[derive(Debug, Error)]
+pub enum LinkError {
+    /// The character format is not one of ours.
+    #[error("{device}: format '{format}' is not DATA PARITY STOP; write for instance 8N1 or 8N2")]
+    Format {
+        /// Which device.
+        device: &'static str,
+        /// What was given.
+        format: String,
+    },
+    /// The port could not be opened.
+    #[error("{device}: port {port} cannot be opened: {source}; check that the device is plugged in, that no other program holds it, and that you may open it (group dialout)")]
+    Open {
+        /// Which device.
+        device: &'static str,
+        /// The port.
+        port: String,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// Nothing answered at the socket.
+    #[error("{device}: {port} did not accept a connection within {seconds} s; check address, power and network")]
+    ConnectTimeout {
+        /// Which device.
+        device: &'static str,
+        /// The address.
+        port: String,
+        /// How long was waited.
+        seconds: u64,
+    },
+}
+
+/// How long a socket may take to accept.
+const CONNECT_SECONDS: u64 = 3;
+
+impl Address {
+    /// Opens the link.
+    ///
+    /// # Errors
+    /// [`LinkError`] names device, port and what to check.
+    pub async fn open(&self) -> Result<Link, LinkError> {
+        let failed = |source: std::io::Error| LinkError::Open { device: self.device, port: self.port.clone(), source };
+        if let Some(address) = self.port.strip_prefix("tcp://") {
+            let connect = tokio::net::TcpStream::connect(address);
+            let stream = tokio::time::timeout(Duration::from_secs(CONNECT_SECONDS), connect)
+                .await
+                .map_err(|_| LinkError::ConnectTimeout { device: self.device, port: self.port.clone(), seconds: CONNECT_SECONDS })?
+                .map_err(failed)?;
+            stream.set_nodelay(true).map_err(failed)?;
+            return Ok(Box::new(stream));
+        }
+        let (data, parity, stop) = self.line_format()?;
+        let port: SerialStream = tokio_serial::new(&self.port, self.baud)
+            .data_bits(data)
+            .parity(parity)
+            .stop_bits(stop)
+            .open_native_async()
+            .map_err(|error| failed(error.into()))?;
+        // What an earlier master left in the buffers is no answer to us.
+        port.clear(tokio_serial::ClearBuffer::All).map_err(|error| failed(error.into()))?;
+        Ok(Box::new(port))
+    }
+
+    fn line_format(&self) -> Result<(DataBits, Parity, StopBits), LinkError> {
+        let refuse = || LinkError::Format { device: self.device, format: self.format.clone() };
+        let mut parts = self.format.chars();
+        let data = match parts.next() {
+            Some('7') => DataBits::Seven,
+            Some('8') => DataBits::Eight,
+            _ => return Err(refuse()),
+        };
+        let parity = match parts.next() {
+            Some('N') => Parity::None,
+            Some('E') => Parity::Even,
+            Some('O') => Parity::Odd,
+            _ => return Err(refuse()),
+        };
+        let stop = match (parts.next(), parts.next()) {
+            (Some('1'), None) => StopBits::One,
+            (Some('2'), None) => StopBits::Two,
+            _ => return Err(refuse()),
+        };
+        Ok((data, parity, stop))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn address(port: &str, format: &str) -> Address {
+        Address { device: "servo", port: port.into(), baud: 38400, format: format.into() }
+    }
+
+    #[test]
+    fn formats() {
+        assert_eq!(address("x", "8N2").line_format().ok(), Some((DataBits::Eight, Parity::None, StopBits::Two)));
+        assert_eq!(address("x", "7E1").line_format().ok(), Some((DataBits::Seven, Parity::Even, StopBits::One)));
+        for wrong in ["", "8", "8N", "8N3", "9N1", "8X1", "8N11"] {
+            assert!(address("x", wrong).line_format().is_err(), "{wrong}");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_missing_port_says_which_and_what_to_do() {
+        let Err(error) = address("/nowhere/servo", "8N1").open().await else { panic!("opened nothing") };
+        let said = error.to_string();
+        assert!(said.contains("servo") && said.contains("/nowhere/servo") && said.contains("plugged in"), "{said}");
+    }
+}

@@ -1,0 +1,372 @@
+//! The rig's profile: which devices, on which ports, within which limits. TOML, checked before anything moves.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// The embedded profile: emulated hardware in this process.
+pub const SIM_PROFILE: &str = include_str!("sim.toml");
+
+/// The embedded gear pair: the source document's, with its documented errors.
+pub const DEFAULT_PAIR: &str = include_str!("pair.toml");
+
+/// A rig's profile.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// The profile's name, stated in every log as its backend.
+    pub name: String,
+    /// Where the registers and limits were taken from.
+    #[serde(default)]
+    pub source: String,
+    /// The servo drive.
+    pub servo: ServoProfile,
+    /// The powder brake and its current source.
+    pub brake: BrakeProfile,
+    /// The box that counts both encoders.
+    pub counter: CounterProfile,
+    /// What is refused before motion and supervised during it.
+    pub limits: Limits,
+    /// How a run goes.
+    pub sequence: Sequence,
+    /// How the log is kept.
+    pub log: LogPolicy,
+}
+
+/// A serial line or socket and its settings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ServoProfile {
+    /// Driver's name, see `device::SERVOS`.
+    pub driver: String,
+    /// Path, `tcp://host:port`, or `sim`.
+    pub port: String,
+    /// Line speed, bit/s.
+    pub baud: u32,
+    /// Character format, for instance `8N2`.
+    pub format: String,
+    /// Modbus unit.
+    pub unit: u8,
+    /// Motor turns a turn of the driver gear.
+    pub reduction: f64,
+    /// +1, or −1 when a positive motor speed turns the driver clockwise.
+    pub sense: i8,
+    /// Ramp from 0 to 3000 rpm of the motor, ms.
+    pub accel_ms: f64,
+    /// Ramp from 3000 rpm of the motor to 0, ms.
+    pub decel_ms: f64,
+}
+
+/// The brake, its driver and its calibration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BrakeProfile {
+    /// Driver's name, see `device::BRAKES`.
+    pub driver: String,
+    /// Path, `tcp://host:port`, or `sim`.
+    pub port: String,
+    /// Line speed, bit/s.
+    pub baud: u32,
+    /// Character format.
+    pub format: String,
+    /// Modbus unit.
+    pub unit: u8,
+    /// Voltage limit of the coil's source, V.
+    pub voltage_v: f64,
+    /// Largest coil current, A.
+    pub current_limit_a: f64,
+    /// Brake turns a turn of the driven gear.
+    pub step_up: f64,
+    /// Rising branch: [coil current A, brake torque N·m], both increasing.
+    pub rising: Vec<[f64; 2]>,
+    /// Falling branch, likewise.
+    pub falling: Vec<[f64; 2]>,
+}
+
+/// The counter box.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CounterProfile {
+    /// Driver's name, see `device::COUNTERS`.
+    pub driver: String,
+    /// Path, `tcp://host:port`, or `sim`.
+    pub port: String,
+    /// Line speed, bit/s.
+    pub baud: u32,
+    /// Character format.
+    pub format: String,
+    /// Unused by the counter box, which is alone on its line.
+    #[serde(default)]
+    pub unit: u8,
+    /// +1, or −1 when the input counts fall while the pair turns in its ccw sense.
+    pub input_sign: i8,
+    /// +1 or −1, likewise for the driven gear.
+    pub output_sign: i8,
+}
+
+/// Limits, refused before motion and supervised during it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Largest speed of the driver gear, rpm.
+    pub speed_rpm: f64,
+    /// Largest load at the driven gear, N·m.
+    pub load_nm: f64,
+    /// Largest slip power of the brake, W.
+    pub slip_power_w: f64,
+    /// Largest temperature of the brake's driver or brake, °C.
+    pub brake_temperature_c: f64,
+    /// Largest departure of TE from the model, mrad; beyond it the teeth are taken to have crashed.
+    pub te_excursion_mrad: f64,
+    /// Longest silence of the encoders, ms.
+    pub encoder_silence_ms: f64,
+}
+
+/// How a run goes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sequence {
+    /// Speed while looking for the index, rpm of the driver.
+    pub home_rpm: f64,
+    /// Time at speed and load before recording, s.
+    pub settle_s: f64,
+    /// Turns of the driver at speed and load before recording.
+    pub settle_turns: f64,
+    /// Time until the brake's torque has arrived, s.
+    pub load_s: f64,
+    /// A motion command is valid for this long, s.
+    pub lease_s: f64,
+    /// Period of the drives' polling, ms.
+    pub poll_ms: f64,
+}
+
+/// How the log is kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogPolicy {
+    /// A chunk is closed after this time, ms.
+    pub chunk_ms: u32,
+    /// The file is synced to disk after this time, ms.
+    pub sync_ms: u32,
+}
+
+/// Why a profile is refused.
+#[derive(Debug, Error)]
+pub enum ProfileError {
+    /// The file could not be read.
+    #[error("profile {path}: {source}; `rigd sim --pty-dir DIR` writes an example to start from")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's reason.
+        source: std::io::Error,
+    },
+    /// The file is not a profile.
+    #[error("profile {path}: {source}")]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Line, key and reason.
+        source: Box<toml::de::Error>,
+    },
+    /// A value is outside its range.
+    #[error("profile {path}: {key} = {value} must be {expected}")]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// Key with its section.
+        key: &'static str,
+        /// What was found.
+        value: String,
+        /// What is accepted.
+        expected: String,
+    },
+}
+
+impl Profile {
+    /// The embedded profile of the simulated rig.
+    ///
+    /// # Panics
+    /// Never: a test parses the embedded text.
+    #[must_use]
+    pub fn simulated() -> Self {
+        #[expect(clippy::expect_used, reason = "the embedded text is parsed by a test")]
+        Self::parse(SIM_PROFILE, Path::new("(embedded)")).expect("the embedded profile is valid")
+    }
+
+    /// Reads and checks a profile.
+    ///
+    /// # Errors
+    /// [`ProfileError`] names file, line, key, value and what is accepted.
+    pub fn load(path: &Path) -> Result<Self, ProfileError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ProfileError::Read { path: path.into(), source })?;
+        Self::parse(&text, path)
+    }
+
+    /// Checks a profile's text; `path` is for the error.
+    ///
+    /// # Errors
+    /// As [`Profile::load`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, ProfileError> {
+        let profile: Self = toml::from_str(text)
+            .map_err(|source| ProfileError::Parse { path: path.into(), source: Box::new(source) })?;
+        profile.check(path)?;
+        Ok(profile)
+    }
+
+    fn check(&self, path: &Path) -> Result<(), ProfileError> {
+        let refuse = |key: &'static str, value: String, expected: String| {
+            Err(ProfileError::Value { path: path.into(), key, value, expected })
+        };
+        let positive = [
+            ("servo.reduction", self.servo.reduction),
+            ("servo.accel_ms", self.servo.accel_ms),
+            ("servo.decel_ms", self.servo.decel_ms),
+            ("brake.voltage_v", self.brake.voltage_v),
+            ("brake.current_limit_a", self.brake.current_limit_a),
+            ("brake.step_up", self.brake.step_up),
+            ("limits.speed_rpm", self.limits.speed_rpm),
+            ("limits.load_nm", self.limits.load_nm),
+            ("limits.slip_power_w", self.limits.slip_power_w),
+            ("limits.brake_temperature_c", self.limits.brake_temperature_c),
+            ("limits.te_excursion_mrad", self.limits.te_excursion_mrad),
+            ("limits.encoder_silence_ms", self.limits.encoder_silence_ms),
+            ("sequence.home_rpm", self.sequence.home_rpm),
+            ("sequence.settle_s", self.sequence.settle_s),
+            ("sequence.settle_turns", self.sequence.settle_turns),
+            ("sequence.load_s", self.sequence.load_s),
+            ("sequence.poll_ms", self.sequence.poll_ms),
+        ];
+        for (key, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return refuse(key, value.to_string(), "a finite number > 0".into());
+            }
+        }
+        let lease = self.sequence.lease_s;
+        let shortest = 2.0 * self.sequence.poll_ms / 1e3;
+        if !(lease >= shortest && lease <= 10.0) {
+            return refuse("sequence.lease_s", lease.to_string(), format!("from {shortest} (two polls) to 10 s"));
+        }
+        if self.sequence.home_rpm > self.limits.speed_rpm {
+            return refuse(
+                "sequence.home_rpm",
+                self.sequence.home_rpm.to_string(),
+                format!("at most limits.speed_rpm = {}", self.limits.speed_rpm),
+            );
+        }
+        if !(1..=100).contains(&self.log.chunk_ms) {
+            return refuse("log.chunk_ms", self.log.chunk_ms.to_string(), "from 1 to 100 ms".into());
+        }
+        if !(10..=1000).contains(&self.log.sync_ms) {
+            return refuse("log.sync_ms", self.log.sync_ms.to_string(), "from 10 to 1000 ms".into());
+        }
+        for (key, sign) in [
+            ("servo.sense", self.servo.sense),
+            ("counter.input_sign", self.counter.input_sign),
+            ("counter.output_sign", self.counter.output_sign),
+        ] {
+            if sign.abs() != 1 {
+                return refuse(key, sign.to_string(), "1 or -1".into());
+            }
+        }
+        for (key, branch) in [("brake.rising", &self.brake.rising), ("brake.falling", &self.brake.falling)] {
+            let finite = branch.iter().flatten().all(|value| value.is_finite() && *value >= 0.0);
+            let increasing = branch.windows(2).all(|pair| pair[1][0] > pair[0][0] && pair[1][1] > pair[0][1]);
+            if branch.len() < 2 || !finite || !increasing {
+                return refuse(key, format!("{branch:?}"), "two points or more, current and torque both increasing from >= 0".into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Period of the drives' polling.
+    #[must_use]
+    pub fn poll_period(&self) -> Duration {
+        Duration::from_secs_f64(self.sequence.poll_ms / 1e3)
+    }
+
+    /// Whether all devices are emulated within this process.
+    #[must_use]
+    pub fn in_process(&self) -> bool {
+        [&self.servo.port, &self.brake.port, &self.counter.port].iter().all(|port| port.as_str() == "sim")
+    }
+
+    /// The profile as TOML.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).unwrap_or_default()
+    }
+}
+
+impl BrakeProfile {
+    /// Coil current that loads the driven gear with `load_nm`, by the rising branch; `None` beyond its end.
+    ///
+    /// The brake turns `step_up` times as fast as the driven gear, so its torque is the load divided by it.
+    #[must_use]
+    pub fn current_a(&self, load_nm: f64) -> Option<f64> {
+        let torque = load_nm / self.step_up;
+        let (first, last) = (self.rising.first()?, self.rising.last()?);
+        if torque <= first[1] {
+            // Less than the drag cannot be had; no current is the closest.
+            return Some(first[0]);
+        }
+        if torque > last[1] {
+            return None;
+        }
+        let above = self.rising.iter().position(|point| point[1] >= torque)?;
+        let (low, high) = (self.rising[above - 1], self.rising[above]);
+        let current = low[0] + (torque - low[1]) / (high[1] - low[1]) * (high[0] - low[0]);
+        (current <= self.current_limit_a).then_some(current)
+    }
+
+    /// Load at the driven gear for a coil current on the rising branch.
+    #[must_use]
+    pub fn load_nm(&self, current_a: f64) -> f64 {
+        let above = self.rising.iter().position(|point| point[0] >= current_a).unwrap_or(self.rising.len() - 1).max(1);
+        let (low, high) = (self.rising[above - 1], self.rising[above]);
+        let torque = low[1] + (current_a - low[0]) / (high[0] - low[0]) * (high[1] - low[1]);
+        torque.max(self.rising[0][1]) * self.step_up
+    }
+
+    /// The least load that the brake can set: its drag.
+    #[must_use]
+    pub fn drag_nm(&self) -> f64 {
+        self.rising[0][1] * self.step_up
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn embedded_profile_is_valid_and_round_trips() {
+        let profile = Profile::simulated();
+        assert!(profile.in_process());
+        let again = Profile::parse(&profile.to_toml(), Path::new("x")).expect("own TOML");
+        assert_eq!(profile, again);
+    }
+
+    #[test]
+    fn brake_curve_inverts() {
+        let brake = Profile::simulated().brake;
+        for load in [0.5, 5.0, 10.0, 20.0] {
+            let current = brake.current_a(load).expect("within the curve");
+            assert!((brake.load_nm(current) - load).abs() < 1e-12);
+        }
+        assert_eq!(brake.current_a(0.0), Some(0.0));
+        assert_eq!(brake.current_a(1e3), None);
+    }
+
+    #[test]
+    fn refusals_name_key_value_and_limit() {
+        let wrong = SIM_PROFILE.replace("chunk_ms = 100", "chunk_ms = 5000");
+        let said = Profile::parse(&wrong, Path::new("lab.toml")).expect_err("too long").to_string();
+        assert!(said.contains("lab.toml") && said.contains("log.chunk_ms") && said.contains("5000") && said.contains("100 ms"), "{said}");
+        let unknown = SIM_PROFILE.replace("lease_s", "leese_s");
+        let said = Profile::parse(&unknown, Path::new("lab.toml")).expect_err("unknown key").to_string();
+        assert!(said.contains("leese_s"), "{said}");
+    }
+}

@@ -1,0 +1,483 @@
+//! From the counter's batches to the log and to live TE: losses are counted, runs begin and end at exact samples.
+
+use gearmodel::measure::{AngleGrid, RunConditions};
+use gearmodel::Direction;
+use riglog::proto::{self, AngleBatch, Phase, RigState, Timestamp};
+use riglog::proto::Level;
+use riglog::{AngleScale, EncoderMetadata};
+use wire::counter_box::{SampleFlags, Samples};
+
+use super::recorder::{Entry, Recorder};
+use crate::analysis::Analysis;
+use crate::clock::Clock;
+use crate::device::CounterIdentity;
+
+/// What the sequencer knows of the rig; written to `/rig/state`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Status {
+    /// Where the run is.
+    pub phase: Phase,
+    /// Sense of the run.
+    pub direction: Option<Direction>,
+    /// Speed that was asked for, rpm of the driver.
+    pub speed_setpoint_rpm: f64,
+    /// Load that was asked for, N·m at the driven gear.
+    pub load_setpoint_nm: f64,
+    /// Load by the brake's calibrated curve, N·m.
+    pub load_nm: f64,
+    /// Coil current, A.
+    pub brake_current_a: f64,
+    /// Temperature, °C.
+    pub brake_temperature_c: f64,
+    /// The drive's alarm.
+    pub servo_alarm: u16,
+}
+
+/// The state of recording a run.
+enum Recording {
+    Idle,
+    /// Begins at the next bin edge.
+    Armed { conditions: RunConditions, revolutions: f64 },
+    /// Ends when θ1 has gone `extent_rad` from the edge where it began.
+    Active { edge_rad: f64, extent_rad: f64, sense: f64, first_sample: u64, began_ns: u64, lost_before: u64 },
+    Done,
+}
+
+/// Latest values, for the progress line and the supervisor.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Latest {
+    /// Host time of the last batch, ns since the Unix epoch.
+    pub arrived_ns: u64,
+    /// Device time of the last sample, ns since the Unix epoch.
+    pub sample_ns: u64,
+    /// Driver speed from the encoder over the last batch, rpm, + = ccw.
+    pub speed_rpm: f64,
+    /// θ1, rad, from the index once homed, else from the start.
+    pub theta1_rad: f64,
+    /// Latest TE, rad.
+    pub te_rad: f64,
+    /// Smallest and largest TE of the active run, rad.
+    pub te_range_rad: [f64; 2],
+    /// Revolutions of the active run.
+    pub revolutions: f64,
+    /// Largest |TE − model − zero| of the last batch, rad.
+    pub excursion_rad: f64,
+}
+
+/// The acquisition.
+pub struct Acquisition {
+    recorder: Recorder,
+    clock: Clock,
+    analysis: Analysis,
+    encoders: EncoderMetadata,
+    theta1: AngleScale,
+    theta2: AngleScale,
+    homed: bool,
+    /// Unix time minus device time, ns.
+    device_offset_ns: Option<i128>,
+    next_sample: u64,
+    samples: u64,
+    lost: u64,
+    recorded_samples: u64,
+    recording: Recording,
+    previous_theta1_rad: Option<f64>,
+    te_zero_rad: Option<f64>,
+    /// Index latches: seen, and the counter value there.
+    index_counts: [Option<i64>; 2],
+    /// Last counts.
+    counts: [i64; 2],
+    /// What the rig is doing.
+    pub status: Status,
+    /// Latest values.
+    pub latest: Latest,
+    inputs: Vec<i64>,
+    outputs: Vec<i64>,
+}
+
+impl Acquisition {
+    /// An acquisition that writes to `recorder` and analyses with `analysis`.
+    #[must_use]
+    pub fn new(recorder: Recorder, clock: Clock, analysis: Analysis) -> Self {
+        // Counts as they come until the counter box has said what they are.
+        let encoders = EncoderMetadata {
+            input_counts_per_rev: 1,
+            output_counts_per_rev: 1,
+            input_lines: 1,
+            output_lines: 1,
+            input_index_counts: 0,
+            output_index_counts: 0,
+            input_sign: 1,
+            output_sign: 1,
+        };
+        Self {
+            recorder,
+            clock,
+            analysis,
+            theta1: encoders.theta1(),
+            theta2: encoders.theta2(),
+            encoders,
+            homed: false,
+            device_offset_ns: None,
+            next_sample: 0,
+            samples: 0,
+            lost: 0,
+            recorded_samples: 0,
+            recording: Recording::Idle,
+            previous_theta1_rad: None,
+            te_zero_rad: None,
+            index_counts: [None; 2],
+            counts: [0; 2],
+            status: Status::default(),
+            latest: Latest::default(),
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+        }
+    }
+
+    /// The encoders as the counter describes them; before the stream starts.
+    pub fn set_encoders(&mut self, identity: &CounterIdentity, signs: [i8; 2]) {
+        self.encoders = EncoderMetadata {
+            input_counts_per_rev: identity.counts_per_rev[0],
+            output_counts_per_rev: identity.counts_per_rev[1],
+            input_lines: u64::from(identity.lines[0]),
+            output_lines: u64::from(identity.lines[1]),
+            input_index_counts: 0,
+            output_index_counts: 0,
+            input_sign: signs[0],
+            output_sign: signs[1],
+        };
+        self.rescale();
+    }
+
+    fn rescale(&mut self) {
+        self.theta1 = self.encoders.theta1();
+        self.theta2 = self.encoders.theta2();
+    }
+
+    /// The recorder.
+    #[must_use]
+    pub fn recorder(&self) -> &Recorder {
+        &self.recorder
+    }
+
+    /// The analysis so far.
+    #[must_use]
+    pub fn analysis(&self) -> &Analysis {
+        &self.analysis
+    }
+
+    /// Samples that arrived since the stream began.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Samples that never arrived.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// Samples of finished runs.
+    #[must_use]
+    pub fn recorded_samples(&self) -> u64 {
+        self.recorded_samples
+    }
+
+    /// Gives recorder and analysis back, for the end.
+    #[must_use]
+    pub fn into_parts(self) -> (Recorder, Analysis) {
+        (self.recorder, self.analysis)
+    }
+
+    /// Writes an event to the log.
+    pub fn event(&self, level: Level, name: &'static str, message: String) {
+        let now = self.clock.now_ns();
+        self.recorder.write(now, now, Entry::Event(level, name, message));
+    }
+
+    /// Both index pulses have been seen.
+    #[must_use]
+    pub fn index_seen(&self) -> bool {
+        self.index_counts.iter().all(Option::is_some)
+    }
+
+    /// The encoder whose index has not been seen.
+    #[must_use]
+    pub fn missing_index(&self) -> Option<&'static str> {
+        ["input", "output"].into_iter().zip(self.index_counts).find(|(_, latched)| latched.is_none()).map(|(which, _)| which)
+    }
+
+    /// Takes the index as zero of both angles and writes the encoders' metadata.
+    ///
+    /// The driven gear's index repeats every turn; the turn is taken that puts TE within half a turn of zero.
+    pub fn home(&mut self) {
+        let [Some(input), Some(output)] = self.index_counts else { return };
+        self.encoders.input_index_counts = input;
+        self.encoders.output_index_counts = output;
+        self.rescale();
+        let theta1 = self.theta1.angle_rad(self.counts[0]);
+        let theta2 = self.theta2.angle_rad(self.counts[1]);
+        let turns = ((theta2 - self.analysis.model().pair.theta2(theta1)) / std::f64::consts::TAU).round() as i64;
+        self.encoders.output_index_counts +=
+            turns * i64::from(self.encoders.output_sign) * self.encoders.output_counts_per_rev as i64;
+        self.rescale();
+        self.homed = true;
+        self.previous_theta1_rad = None;
+        let now = self.clock.now_ns();
+        self.recorder.write(now, now, Entry::Encoders(self.encoders.clone()));
+    }
+
+    /// Records `revolutions` whole turns from the next bin edge on.
+    pub fn arm(&mut self, conditions: RunConditions, revolutions: f64) {
+        self.latest.te_range_rad = [f64::INFINITY, f64::NEG_INFINITY];
+        self.te_zero_rad = None;
+        self.recording = Recording::Armed { conditions, revolutions };
+    }
+
+    /// The armed run is over.
+    #[must_use]
+    pub fn recorded(&self) -> bool {
+        matches!(self.recording, Recording::Done)
+    }
+
+    /// Ends a run before its time: what was recorded stays, and the state says where it ends.
+    pub fn abandon(&mut self) {
+        if matches!(self.recording, Recording::Active { .. }) {
+            let end = self.latest.sample_ns + 1;
+            self.end_run(end, self.next_sample);
+        }
+        self.recording = Recording::Idle;
+    }
+
+    /// Writes `/rig/state`, dated by the latest sample.
+    pub fn write_state(&self) {
+        let now = self.clock.now_ns();
+        let time = if self.latest.sample_ns == 0 { now } else { self.latest.sample_ns };
+        self.write_state_at(now, time, self.next_sample);
+    }
+
+    fn write_state_at(&self, log_time_ns: u64, time_ns: u64, samples: u64) {
+        let status = &self.status;
+        let state = RigState {
+            timestamp: Some(Timestamp::from_ns(time_ns)),
+            phase: status.phase.into(),
+            direction: status.direction.map_or(proto::Direction::Unspecified, proto::Direction::from).into(),
+            speed_setpoint_rpm: status.speed_setpoint_rpm,
+            speed_rpm: self.latest.speed_rpm,
+            load_setpoint_nm: status.load_setpoint_nm,
+            load_nm: status.load_nm,
+            brake_current_a: status.brake_current_a,
+            brake_temperature_c: status.brake_temperature_c,
+            servo_alarm: u32::from(status.servo_alarm),
+            samples,
+            samples_lost: self.lost,
+        };
+        self.recorder.write(log_time_ns, time_ns, Entry::State(state));
+    }
+
+    /// Takes a batch: decodes, counts losses, splits it where a run begins or ends, writes it, and feeds the analysis.
+    pub fn take(&mut self, batch: &Samples) {
+        let arrived = self.clock.now_ns();
+        let count = batch.input_delta.len();
+        if count == 0 {
+            return;
+        }
+        let last_device_ns = batch.device_time_ns + (count as u64 - 1) * u64::from(batch.dt_ns);
+        let offset = *self.device_offset_ns.get_or_insert(i128::from(arrived) - i128::from(last_device_ns));
+        let first_ns = (i128::from(batch.device_time_ns) + offset) as u64;
+        self.count_losses(batch.first_sample);
+        self.next_sample = batch.first_sample + count as u64;
+        self.samples += count as u64;
+        for (latched, seen, counts) in [
+            (0, batch.flags.has(SampleFlags::INPUT_INDEX), batch.input_index_counts),
+            (1, batch.flags.has(SampleFlags::OUTPUT_INDEX), batch.output_index_counts),
+        ] {
+            if seen {
+                self.index_counts[latched] = Some(counts);
+            }
+        }
+        accumulate(batch.input_base, &batch.input_delta, &mut self.inputs);
+        accumulate(batch.output_base, &batch.output_delta, &mut self.outputs);
+        self.measure_speed(batch.dt_ns);
+        self.latest.arrived_ns = arrived;
+        self.latest.excursion_rad = 0.0;
+
+        let mut written = 0;
+        if self.homed && !matches!(self.recording, Recording::Idle | Recording::Done) {
+            written = self.scan(batch, first_ns, arrived);
+        } else if self.homed {
+            self.previous_theta1_rad = Some(self.theta1.angle_rad(self.inputs[count - 1]));
+        }
+        self.write_part(batch, first_ns, arrived, written, count);
+        self.counts = [self.inputs[count - 1], self.outputs[count - 1]];
+        self.latest.theta1_rad = self.theta1.angle_rad(self.counts[0]);
+        self.latest.sample_ns = first_ns + (count as u64 - 1) * u64::from(batch.dt_ns);
+    }
+
+    fn count_losses(&mut self, first_sample: u64) {
+        if first_sample > self.next_sample {
+            let lost = first_sample - self.next_sample;
+            self.lost += lost;
+            self.event(
+                Level::Warning,
+                "loss",
+                format!("samples {} to {} never arrived ({lost} lost)", self.next_sample, first_sample - 1),
+            );
+        }
+    }
+
+    fn measure_speed(&mut self, dt_ns: u32) {
+        let count = self.inputs.len();
+        if count < 2 || self.encoders.input_counts_per_rev == 0 {
+            return;
+        }
+        let turns = (self.inputs[count - 1] - self.inputs[0]) as f64 * f64::from(self.encoders.input_sign)
+            / self.encoders.input_counts_per_rev as f64;
+        let minutes = (count - 1) as f64 * f64::from(dt_ns) / 60e9;
+        self.latest.speed_rpm = turns / minutes;
+    }
+
+    /// Walks the samples of a run; returns how many of the batch have been written already.
+    fn scan(&mut self, batch: &Samples, first_ns: u64, arrived: u64) -> usize {
+        let grid = AngleGrid::default();
+        let mut written = 0;
+        for index in 0..self.inputs.len() {
+            let theta1 = self.theta1.angle_rad(self.inputs[index]);
+            match &self.recording {
+                Recording::Armed { conditions, .. } => {
+                    let direction = conditions.direction;
+                    let edge = self.previous_theta1_rad.and_then(|previous| edge_between(grid, previous, theta1, direction));
+                    self.previous_theta1_rad = Some(theta1);
+                    let Some(edge_rad) = edge else { continue };
+                    self.write_part(batch, first_ns, arrived, written, index);
+                    written = index;
+                    self.begin_run(edge_rad, batch, first_ns, index, arrived);
+                }
+                Recording::Active { edge_rad, extent_rad, sense, .. } => {
+                    if (theta1 - edge_rad) * sense >= *extent_rad {
+                        self.write_part(batch, first_ns, arrived, written, index);
+                        written = index;
+                        let end_ns = first_ns + index as u64 * u64::from(batch.dt_ns);
+                        self.end_run(end_ns, batch.first_sample + index as u64);
+                    }
+                }
+                Recording::Idle | Recording::Done => break,
+            }
+            if let Recording::Active { edge_rad, .. } = self.recording {
+                let theta2 = self.theta2.angle_rad(self.outputs[index]);
+                let time_ns = first_ns + index as u64 * u64::from(batch.dt_ns);
+                self.measure(theta1, theta2, time_ns, arrived);
+                self.latest.revolutions = (theta1 - edge_rad).abs() / std::f64::consts::TAU;
+            }
+        }
+        written
+    }
+
+    fn measure(&mut self, theta1: f64, theta2: f64, time_ns: u64, arrived: u64) {
+        let Some(point) = self.analysis.push(theta1, theta2) else { return };
+        let direction = self.status.direction.unwrap_or(Direction::Ccw);
+        let model = self.analysis.model().te_rad(point.theta1_rad, direction, self.status.load_setpoint_nm);
+        let zero = *self.te_zero_rad.get_or_insert(point.te_rad - model);
+        let latest = &mut self.latest;
+        latest.te_rad = point.te_rad;
+        latest.te_range_rad = [latest.te_range_rad[0].min(point.te_rad), latest.te_range_rad[1].max(point.te_rad)];
+        latest.excursion_rad = latest.excursion_rad.max((point.te_rad - model - zero).abs());
+        let message = proto::TransmissionError {
+            timestamp: Some(Timestamp::from_ns(time_ns)),
+            direction: proto::Direction::from(direction).into(),
+            revolution: point.revolution,
+            theta1_rad: point.theta1_rad,
+            theta2_rad: point.theta2_rad,
+            te_rad: point.te_rad,
+            model_te_rad: model,
+            load_nm: self.status.load_nm,
+            speed_rpm: latest.speed_rpm,
+        };
+        self.recorder.write(arrived, time_ns, Entry::Te(message));
+    }
+
+    fn begin_run(&mut self, edge_rad: f64, batch: &Samples, first_ns: u64, index: usize, arrived: u64) {
+        let Recording::Armed { conditions, revolutions } = self.recording else { return };
+        let began_ns = first_ns + index as u64 * u64::from(batch.dt_ns);
+        self.recording = Recording::Active {
+            edge_rad,
+            extent_rad: revolutions * std::f64::consts::TAU,
+            sense: conditions.direction.sign(),
+            first_sample: batch.first_sample + index as u64,
+            began_ns,
+            lost_before: self.lost,
+        };
+        self.status.phase = Phase::Record;
+        self.analysis.begin(conditions);
+        self.write_state_at(arrived, began_ns, batch.first_sample + index as u64);
+    }
+
+    fn end_run(&mut self, end_ns: u64, end_sample: u64) {
+        let Recording::Active { first_sample, began_ns, lost_before, .. } = self.recording else { return };
+        let arrived = self.clock.now_ns();
+        self.recording = Recording::Done;
+        self.status.phase = Phase::Approach;
+        self.write_state_at(arrived, end_ns, end_sample);
+        let lost = self.lost - lost_before;
+        self.recorded_samples += end_sample - first_sample - lost;
+        let duration_s = (end_ns - began_ns) as f64 * 1e-9;
+        let grid = AngleGrid::default();
+        let load_nm = self.status.load_nm;
+        let model = self.analysis.model().clone();
+        let Some(backlash) = self.analysis.end(lost, duration_s) else { return };
+        for (bin, value) in backlash.curve.curve.values_rad.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+            let message = proto::Backlash {
+                timestamp: Some(Timestamp::from_ns(end_ns)),
+                theta1_rad: grid.centre(bin),
+                backlash_rad: *value,
+                model_backlash_rad: model.backlash_rad(grid.centre(bin), backlash.conditions.load_nm),
+                load_nm,
+            };
+            self.recorder.write(arrived, end_ns, Entry::Backlash(message));
+        }
+    }
+
+    /// Writes samples `from..to` of a batch as a message of their own.
+    fn write_part(&self, batch: &Samples, first_ns: u64, arrived: u64, from: usize, to: usize) {
+        if from == to {
+            return;
+        }
+        let deltas = |all: &[i32]| {
+            let mut part = all[from..to].to_vec();
+            part[0] = 0;
+            part
+        };
+        let t0_ns = first_ns + from as u64 * u64::from(batch.dt_ns);
+        let message = AngleBatch {
+            t0_ns,
+            dt_ns: batch.dt_ns,
+            first_sample: batch.first_sample + from as u64,
+            input_base: self.inputs[from],
+            output_base: self.outputs[from],
+            input_delta: deltas(&batch.input_delta),
+            output_delta: deltas(&batch.output_delta),
+        };
+        self.recorder.write(arrived, t0_ns, Entry::Angles(message));
+    }
+}
+
+/// The bin edge that θ1 passed from `previous` to `theta1` in the sense of `direction`, rad; `None` if it passed none.
+fn edge_between(grid: AngleGrid, previous: f64, theta1: f64, direction: Direction) -> Option<f64> {
+    let width = std::f64::consts::TAU / grid.bins() as f64;
+    let edge = match direction {
+        Direction::Ccw => (theta1 / width).floor() * width,
+        Direction::Cw => (theta1 / width).ceil() * width,
+    };
+    ((edge - previous) * direction.sign() > 0.0).then_some(edge)
+}
+
+/// Counts from a base and the steps between samples; the first step is 0.
+fn accumulate(base: i64, deltas: &[i32], counts: &mut Vec<i64>) {
+    counts.clear();
+    let mut value = base;
+    counts.extend(deltas.iter().map(|delta| {
+        value += i64::from(*delta);
+        value
+    }));
+}

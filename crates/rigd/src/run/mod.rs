@@ -1,0 +1,27 @@
+//! One run of the rig, from connecting to the finalised log.
+
+pub mod acquire;
+pub mod halt;
+pub mod progress;
+pub mod recorder;
+pub mod rig;
+pub mod sequence;
+pub mod session;
+pub mod stop;
+
+use gearmodel::Direction;
+
+/// What a run shall measure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Senses, in their order.
+    pub directions: Vec<Direction>,
+    /// Loads at the driven gear, N·m, in their order.
+    pub loads_nm: Vec<f64>,
+    /// Speed of the driver, rpm.
+    pub speed_rpm: f64,
+    /// Whole revolutions of the driver to record, each.
+    pub revolutions: f64,
+    /// Sampling, Hz.
+    pub rate_hz: f64,
+}

@@ -1,0 +1,153 @@
+//! The recorder: a thread of its own owns the log, so that compressing and syncing never hold up the encoders.
+//!
+//! Its queue is long and, when full, makes the sender wait: nothing is dropped here. A write error is kept for the sequencer,
+//! which stops the rig; what comes after it is counted, not hidden.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use riglog::proto::{AngleBatch, Backlash, RigState, TransmissionError};
+use riglog::proto::Level;
+use riglog::{EncoderMetadata, LogError, LogStatistics, LogWriter, RunMetadata, WriterOptions};
+
+/// Messages that may wait for the recorder: 80 s at 100 batches a second.
+const QUEUE: usize = 8192;
+
+/// One entry of the log.
+#[derive(Debug)]
+pub enum Entry {
+    /// `/rig/angles`.
+    Angles(AngleBatch),
+    /// `/rig/state`.
+    State(RigState),
+    /// `/rig/te`.
+    Te(TransmissionError),
+    /// `/rig/backlash`.
+    Backlash(Backlash),
+    /// `/rig/events`.
+    Event(Level, &'static str, String),
+    /// Metadata `rig.run`.
+    Run(Box<RunMetadata>),
+    /// Metadata `rig.encoders`.
+    Encoders(EncoderMetadata),
+    /// An attachment: name, media type, content.
+    Attachment(&'static str, &'static str, Vec<u8>),
+}
+
+struct Stamped {
+    log_time_ns: u64,
+    publish_time_ns: u64,
+    entry: Entry,
+}
+
+/// What the recorder's thread shares.
+#[derive(Default)]
+struct Shared {
+    failure: Mutex<Option<LogError>>,
+    unwritten: AtomicU64,
+}
+
+/// Handle of the recorder.
+pub struct Recorder {
+    path: PathBuf,
+    queue: Option<SyncSender<Stamped>>,
+    thread: Option<JoinHandle<Result<LogStatistics, LogError>>>,
+    shared: Arc<Shared>,
+}
+
+impl Recorder {
+    /// Makes the log and starts the thread.
+    ///
+    /// # Errors
+    /// [`LogError`] when the file cannot be made.
+    pub fn create(path: &Path, options: WriterOptions) -> Result<Self, LogError> {
+        let writer = LogWriter::create(path, options)?;
+        let (queue, entries) = sync_channel(QUEUE);
+        let shared = Arc::new(Shared::default());
+        let theirs = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("recorder".into())
+            .spawn(move || record(writer, &entries, &theirs))
+            .map_err(|source| LogError::Io { path: path.into(), action: "start the recorder's thread for", source })?;
+        Ok(Self { path: path.into(), queue: Some(queue), thread: Some(thread), shared })
+    }
+
+    /// Where the log is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Hands an entry to the recorder; waits when its queue is full.
+    pub fn write(&self, log_time_ns: u64, publish_time_ns: u64, entry: Entry) {
+        let sent = self.queue.as_ref().map(|queue| queue.send(Stamped { log_time_ns, publish_time_ns, entry }));
+        if !matches!(sent, Some(Ok(()))) {
+            self.shared.unwritten.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// The write error, once.
+    #[must_use]
+    pub fn take_failure(&self) -> Option<LogError> {
+        self.shared.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    /// Entries that could not be written after a failure.
+    #[must_use]
+    pub fn unwritten(&self) -> u64 {
+        self.shared.unwritten.load(Ordering::Relaxed)
+    }
+
+    /// Writes what is queued, then the end of the log.
+    ///
+    /// # Errors
+    /// [`LogError`] when the end could not be written; the log is then readable up to its last whole chunk.
+    pub fn finish(mut self) -> Result<LogStatistics, LogError> {
+        self.queue = None;
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(outcome)) => outcome,
+            // The thread's panic goes on in ours: the message was printed where it arose.
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+            None => unreachable!("finish consumes the recorder"),
+        }
+    }
+}
+
+fn record(mut writer: LogWriter, entries: &Receiver<Stamped>, shared: &Shared) -> Result<LogStatistics, LogError> {
+    let mut failed = false;
+    loop {
+        let outcome = match entries.recv_timeout(Duration::from_millis(50)) {
+            Ok(_) if failed => {
+                shared.unwritten.fetch_add(1, Ordering::Relaxed);
+                continue;
+            }
+            Ok(stamped) => write(&mut writer, stamped),
+            Err(RecvTimeoutError::Timeout) if failed => continue,
+            Err(RecvTimeoutError::Timeout) => writer.tick(),
+            Err(RecvTimeoutError::Disconnected) => return writer.finish(),
+        };
+        if let Err(error) = outcome {
+            failed = true;
+            shared.unwritten.fetch_add(1, Ordering::Relaxed);
+            *shared.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+        }
+    }
+}
+
+fn write(writer: &mut LogWriter, stamped: Stamped) -> Result<(), LogError> {
+    let Stamped { log_time_ns, publish_time_ns, entry } = stamped;
+    match entry {
+        Entry::Angles(batch) => writer.angles(log_time_ns, publish_time_ns, &batch),
+        Entry::State(state) => writer.state(log_time_ns, publish_time_ns, &state),
+        Entry::Te(te) => writer.te(log_time_ns, publish_time_ns, &te),
+        Entry::Backlash(backlash) => writer.backlash(log_time_ns, publish_time_ns, &backlash),
+        Entry::Event(level, name, message) => writer.event(log_time_ns, publish_time_ns, level, name, &message),
+        Entry::Run(run) => writer.run_metadata(&run),
+        Entry::Encoders(encoders) => writer.encoders(&encoders),
+        Entry::Attachment(name, media_type, data) => writer.attach(log_time_ns, name, media_type, &data),
+    }
+}

@@ -1,0 +1,173 @@
+//! The simulated rig: a plant in the time domain behind emulated devices that answer the real devices' bytes.
+//!
+//! [`plant`] is the physics and shares no code with the model that is checked against it; [`emulator`] speaks the devices'
+//! languages; [`world`] holds both on one clock; [`serve`] carries their bytes over pipes in this process or, with [`pty`], over
+//! terminals that any master can open. Drivers and codecs are the same either way.
+
+pub mod emulator;
+pub mod plant;
+pub mod pty;
+pub mod serve;
+pub mod world;
+
+use std::cell::RefCell;
+use std::path::Path;
+use std::rc::Rc;
+use std::time::Duration;
+
+use gearmodel::NominalModel;
+use gearmodel::pitch_curve::AnyCurve;
+use thiserror::Error;
+
+pub use plant::PlantSpec;
+use plant::undocumented::UNDOCUMENTED;
+use pty::Terminal;
+use world::World;
+
+use crate::profile::Profile;
+use crate::run::session::Links;
+use crate::run::stop::StopRequests;
+
+/// Bytes that a pipe in this process holds.
+const PIPE_BYTES: usize = 1 << 18;
+
+/// Why there is no simulated rig.
+#[derive(Debug, Error)]
+pub enum SimError {
+    /// The plant cannot be built.
+    #[error("simulated rig: {0}")]
+    Plant(#[from] plant::PlantError),
+    /// The pair is of a kind that the plant cannot turn.
+    #[error("simulated rig: a pair of kind '{kind}' has no simulated gears; elliptical and circular pairs have")]
+    Kind {
+        /// The kind.
+        kind: &'static str,
+    },
+    /// An effect that there is not.
+    #[error("'{name}' is not an effect of the simulated rig; it has: {known}")]
+    Effect {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// A port could not be made.
+    #[error("{what}: {source}")]
+    Io {
+        /// What was tried.
+        what: String,
+        /// The operating system's reason.
+        source: std::io::Error,
+    },
+}
+
+/// Whether the plant has an effect of this name.
+#[must_use]
+pub fn is_undocumented(name: &str) -> bool {
+    UNDOCUMENTED.iter().any(|(known, ..)| *known == name)
+}
+
+/// Names of the plant's effects.
+#[must_use]
+pub fn undocumented_names() -> Vec<&'static str> {
+    UNDOCUMENTED.iter().map(|(name, ..)| *name).collect()
+}
+
+/// The plant's effects, a line each.
+#[must_use]
+pub fn describe_undocumented() -> String {
+    UNDOCUMENTED.iter().map(|(name, summary, _)| format!("{name:<32} {summary}")).collect::<Vec<_>>().join("\n")
+}
+
+/// The plant for a nominal pair: its gears and documented errors, and what is left undocumented.
+///
+/// # Errors
+/// [`SimError`] for a kind of pair or an effect that the plant has not.
+pub fn spec(model: &NominalModel, undocumented: &[String]) -> Result<PlantSpec, SimError> {
+    let (pair, errors) = (&model.pair, &model.errors);
+    let mut spec = PlantSpec::default();
+    let eccentricity = match pair.pitch_curve() {
+        AnyCurve::Ellipse(ellipse) => ellipse.eccentricity(),
+        AnyCurve::Circle(_) if pair.has_teeth() => 0.0,
+        _ => return Err(SimError::Kind { kind: pair.kind() }),
+    };
+    let gears = &mut spec.gears;
+    gears.module_mm = pair.module_mm();
+    gears.teeth = [pair.teeth().0, pair.teeth().1];
+    gears.eccentricity = eccentricity;
+    gears.pressure_angle_deg = pair.pressure_angle_rad().to_degrees();
+    gears.backlash_mm = pair.backlash_mm();
+    gears.e1_mm = errors.e1_mm;
+    gears.phi1_rad = errors.phi1_rad;
+    gears.e2_mm = errors.e2_mm;
+    gears.phi2_rad = errors.phi2_rad;
+    spec.shafts.compliance_output_rad_per_nm = errors.shaft_compliance_output_rad_per_nm;
+    spec.shafts.compliance_input_rad_per_nm = errors.shaft_compliance_input_rad_per_nm;
+    spec.mesh.compliance_mm2_rad_per_nm = errors.mesh_compliance_mm2_rad_per_nm;
+    for name in undocumented {
+        let (.., apply) = UNDOCUMENTED.iter().find(|(known, ..)| known == name).ok_or_else(|| SimError::Effect {
+            name: name.clone(),
+            known: undocumented_names().join(", "),
+        })?;
+        apply(&mut spec);
+    }
+    Ok(spec)
+}
+
+/// Starts the rig within this process, on the runtime's clock; needs a local task set.
+///
+/// # Errors
+/// [`SimError`] when the plant cannot be built.
+pub fn start_in_process(spec: &PlantSpec, rate_hz: f64, seed: u64) -> Result<Links, SimError> {
+    let world = Rc::new(RefCell::new(World::new(spec, rate_hz, seed)?));
+    let pipe = || tokio::io::duplex(PIPE_BYTES);
+    let ((servo, servo_device), (brake, brake_device), (counter, counter_device)) = (pipe(), pipe(), pipe());
+    let profile = Profile::simulated();
+    tokio::task::spawn_local(serve::modbus(servo_device, Rc::clone(&world), serve::Slave::servo(&profile)));
+    tokio::task::spawn_local(serve::modbus(brake_device, Rc::clone(&world), serve::Slave::brake(&profile)));
+    tokio::task::spawn_local(serve::counter(counter_device, world));
+    Ok(Links { servo: Some(Box::new(servo)), brake: Some(Box::new(brake)), counter: Some(Box::new(counter)) })
+}
+
+/// Serves the rig on pseudo-terminals in `directory` until a stop is asked for; prints a line a device, then `ready`.
+///
+/// # Errors
+/// [`SimError`] when the plant cannot be built or a port cannot be made.
+pub async fn serve_ptys(spec: &PlantSpec, seed: u64, directory: &Path, profile: &Profile, stop: StopRequests) -> Result<(), SimError> {
+    use std::io::Write as _;
+    let io = |what: String| move |source| SimError::Io { what, source };
+    let directory = directory.canonicalize().map_err(io(format!("directory {}", directory.display())))?;
+    let world = Rc::new(RefCell::new(World::new(spec, world::IDLE_RATE_HZ, seed)?));
+    let port = |name: &str| {
+        let path = directory.join(name);
+        Terminal::at(&path).map_err(io(format!("port {}", path.display())))
+    };
+    let ((servo, at_servo), (brake, at_brake), (counter, at_counter)) = (port("servo")?, port("brake")?, port("counter")?);
+    let mut profile = profile.clone();
+    let at = |name: &str| directory.join(name).display().to_string();
+    (profile.servo.port, profile.brake.port, profile.counter.port) = (at("servo"), at("brake"), at("counter"));
+    let written = directory.join("profile.toml");
+    std::fs::write(&written, profile.to_toml()).map_err(io(format!("profile {}", written.display())))?;
+
+    tokio::task::spawn_local(serve::modbus(servo, Rc::clone(&world), serve::Slave::servo(&profile)));
+    tokio::task::spawn_local(serve::modbus(brake, Rc::clone(&world), serve::Slave::brake(&profile)));
+    tokio::task::spawn_local(serve::counter(counter, Rc::clone(&world)));
+    let mut out = std::io::stdout();
+    let ports = [
+        ("servo", &profile.servo.port, profile.servo.baud, &profile.servo.format, profile.servo.unit),
+        ("brake", &profile.brake.port, profile.brake.baud, &profile.brake.format, profile.brake.unit),
+        ("counter", &profile.counter.port, profile.counter.baud, &profile.counter.format, profile.counter.unit),
+    ];
+    for (name, path, baud, format, unit) in ports {
+        // Whoever started us may have stopped reading; the rig runs on.
+        let _ = writeln!(out, "{name} {path} {baud} {format} unit {unit}");
+    }
+    let _ = writeln!(out, "ready").and_then(|()| out.flush());
+    while !stop.any() {
+        tokio::time::sleep(Duration::from_millis(50)).await;
+        for port in [&at_servo, &at_brake, &at_counter] {
+            port.unlock();
+        }
+    }
+    Ok(())
+}

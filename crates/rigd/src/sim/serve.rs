@@ -1,0 +1,121 @@
+//! Carries the emulators' bytes: over pipes in this process, or over pseudo-terminals. Wire time is simulated, for neither paces.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
+use tokio::time::{Instant, sleep_until, timeout};
+use wire::modbus::{LineSettings, Request, frame_time, inter_frame_silence};
+
+use super::emulator::{ModbusLine, Reply};
+use super::world::World;
+use crate::profile::Profile;
+
+/// A Modbus slave of the world: its place on its line, and who answers.
+pub struct Slave {
+    unit: u8,
+    line: LineSettings,
+    handle: fn(&mut World, &Request) -> Reply,
+}
+
+impl Slave {
+    /// The servo drive.
+    #[must_use]
+    pub fn servo(profile: &Profile) -> Self {
+        let servo = &profile.servo;
+        Self { unit: servo.unit, line: settings(servo.baud, &servo.format), handle: World::ask_servo }
+    }
+
+    /// The brake's current source.
+    #[must_use]
+    pub fn brake(profile: &Profile) -> Self {
+        let brake = &profile.brake;
+        Self { unit: brake.unit, line: settings(brake.baud, &brake.format), handle: World::ask_brake }
+    }
+}
+
+fn settings(baud: u32, format: &str) -> LineSettings {
+    LineSettings::no_parity(baud, if format.ends_with('2') { 2 } else { 1 })
+}
+
+/// Serves a Modbus slave until its line is closed.
+pub async fn modbus(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<World>>, slave: Slave) {
+    let mut protocol = ModbusLine::new();
+    let mut buffer = [0; 512];
+    let silence = inter_frame_silence(slave.line.baud);
+    let mut partial = false;
+    loop {
+        // A frame that has begun ends, at the latest, with a silence.
+        let read = if partial {
+            timeout(silence.max(Duration::from_millis(2)), line.read(&mut buffer)).await
+        } else {
+            Ok(line.read(&mut buffer).await)
+        };
+        let answers = match read {
+            Ok(Ok(0) | Err(_)) => return,
+            Ok(Ok(count)) => {
+                // The request's own time on the wire: a pipe delivers it at once.
+                sleep_until(Instant::now() + frame_time(count, &slave.line)).await;
+                partial = true;
+                let mut world = world.borrow_mut();
+                world.advance();
+                protocol.receive(&buffer[..count], slave.unit, |request| (slave.handle)(&mut world, request))
+            }
+            Err(_) => {
+                partial = false;
+                let mut world = world.borrow_mut();
+                world.advance();
+                protocol.idle(slave.unit, |request| (slave.handle)(&mut world, request))
+            }
+        };
+        let asked = Instant::now();
+        for answer in answers {
+            partial = false;
+            // A master takes the answer when its last byte has passed the wire.
+            let delay = Duration::from_nanos(answer.after_ns) + frame_time(answer.bytes.len(), &slave.line);
+            sleep_until(asked + delay).await;
+            if line.write_all(&answer.bytes).await.is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// How long a write may wait for the master before the box counts its line as blocked.
+const BLOCKED: Duration = Duration::from_millis(5);
+
+/// Serves the counter box until its line is closed.
+pub async fn counter(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<World>>) {
+    let mut bytes = Vec::new();
+    let mut sent = 0;
+    let mut buffer = [0; 512];
+    loop {
+        let due = world.borrow().next_frame();
+        tokio::select! {
+            biased;
+            read = line.read(&mut buffer) => {
+                let Ok(count @ 1..) = read else { return };
+                let mut world = world.borrow_mut();
+                world.advance();
+                world.tell_counter(&buffer[..count]);
+            }
+            () = sleep_until(due) => world.borrow_mut().advance(),
+        }
+        world.borrow_mut().take_stream(&mut bytes);
+        // A frame once begun is ended, however late; while it waits, the box drops whole frames.
+        let blocked = loop {
+            if sent == bytes.len() {
+                break false;
+            }
+            match timeout(BLOCKED, line.write(&bytes[sent..])).await {
+                Ok(Ok(count @ 1..)) => sent += count,
+                Ok(_) => return,
+                Err(_) => break true,
+            }
+        };
+        bytes.drain(..sent);
+        sent = 0;
+        world.borrow_mut().set_line_blocked(blocked);
+    }
+}

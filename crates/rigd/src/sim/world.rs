@@ -1,0 +1,155 @@
+//! The plant and its devices on one clock: whoever touches a device first brings the plant up to now.
+
+use std::time::Duration;
+
+use tokio::time::Instant;
+use wire::modbus::Request;
+use wire::rd60xx::Model;
+
+use super::emulator::{BrakeCoil, BrakeEmulator, CounterEmulator, EncoderPair, Latched, Reply, ServoAxis, ServoEmulator};
+use super::plant::{Plant, PlantError, PlantSpec};
+
+/// Sampling of the plant while the counter box does not ask for any, Hz.
+pub const IDLE_RATE_HZ: f64 = 10_000.0;
+
+/// How often the counter box looks whether a frame is full.
+const FRAME_PERIOD: Duration = Duration::from_millis(10);
+
+/// Longest time that is caught up in one go: a process that was suspended does not replay hours.
+const LONGEST_CATCH_UP_NS: u64 = 2_000_000_000;
+
+/// The simulated rig.
+pub struct World {
+    plant: Plant,
+    servo: ServoEmulator,
+    brake: BrakeEmulator,
+    counter: CounterEmulator,
+    start: Instant,
+    period_ns: u64,
+    time_ns: u64,
+    stream: Vec<u8>,
+}
+
+impl World {
+    /// A rig at rest.
+    ///
+    /// # Errors
+    /// [`PlantError`] when the plant cannot be built.
+    pub fn new(spec: &PlantSpec, rate_hz: f64, seed: u64) -> Result<Self, PlantError> {
+        let plant = Plant::new(spec, rate_hz, seed)?;
+        let counter = CounterEmulator::new("SIM-0001", &plant);
+        Ok(Self {
+            plant,
+            servo: ServoEmulator::new(1),
+            brake: BrakeEmulator::new(1, Model::Rd6006),
+            counter,
+            start: Instant::now(),
+            period_ns: (1e9 / rate_hz).round() as u64,
+            time_ns: 0,
+            stream: Vec::new(),
+        })
+    }
+
+    /// Brings the plant up to now, and hands its samples to the counter box.
+    pub fn advance(&mut self) {
+        let now_ns = self.start.elapsed().as_nanos() as u64;
+        if now_ns > self.time_ns + LONGEST_CATCH_UP_NS {
+            self.time_ns = now_ns - LONGEST_CATCH_UP_NS;
+        }
+        while self.time_ns + self.period_ns <= now_ns {
+            let sample = self.plant.step();
+            self.time_ns += self.period_ns;
+            let latched = Latched {
+                input: sample.input_counts,
+                output: sample.output_counts,
+                input_index: self.plant.input_index_counts(),
+                output_index: self.plant.output_index_counts(),
+            };
+            self.counter.sample(self.time_ns, &latched, &mut self.stream);
+        }
+        self.servo.tick(now_ns, &mut self.plant);
+        self.brake.tick(now_ns, &mut self.plant);
+        self.counter.tick(now_ns, &mut self.stream);
+    }
+
+    /// When the counter box looks for a full frame next.
+    #[must_use]
+    pub fn next_frame(&self) -> Instant {
+        let periods = self.start.elapsed().as_nanos() / FRAME_PERIOD.as_nanos() + 1;
+        self.start + Duration::from_nanos((periods * FRAME_PERIOD.as_nanos()) as u64)
+    }
+
+    /// Asks the servo drive.
+    pub fn ask_servo(&mut self, request: &Request) -> Reply {
+        self.servo.handle(self.time_ns, request, &mut self.plant)
+    }
+
+    /// Asks the brake's current source.
+    pub fn ask_brake(&mut self, request: &Request) -> Reply {
+        self.brake.handle(self.time_ns, request, &mut self.plant)
+    }
+
+    /// Gives the counter box bytes from its master; its answers join the stream.
+    pub fn tell_counter(&mut self, bytes: &[u8]) {
+        self.counter.receive(bytes, &mut self.stream);
+        let Some(period_ns) = self.counter.sample_period_ns().map(u64::from) else { return };
+        if period_ns != self.period_ns && self.plant.set_sample_rate_hz(1e9 / period_ns as f64).is_ok() {
+            self.period_ns = period_ns;
+        }
+    }
+
+    /// Takes what the counter box sends.
+    pub fn take_stream(&mut self, bytes: &mut Vec<u8>) {
+        bytes.append(&mut self.stream);
+    }
+
+    /// Tells the counter box whether its line takes bytes.
+    pub fn set_line_blocked(&mut self, blocked: bool) {
+        self.counter.set_line_blocked(blocked);
+    }
+}
+
+impl ServoAxis for Plant {
+    fn set_enabled(&mut self, enabled: bool) {
+        self.set_enabled(enabled);
+    }
+    fn set_speed_reference_rpm(&mut self, rpm: f64) {
+        self.set_speed_reference_rpm(rpm);
+    }
+    fn set_ramp_ms(&mut self, accel_ms: f64, decel_ms: f64) {
+        self.set_ramp_ms(accel_ms, decel_ms);
+    }
+    fn speed_rpm(&self) -> f64 {
+        self.speed_rpm()
+    }
+    fn torque_percent(&self) -> f64 {
+        self.torque_percent()
+    }
+    fn reference_speed_after_ramp_rpm(&self) -> f64 {
+        self.reference_speed_after_ramp_rpm()
+    }
+}
+
+impl BrakeCoil for Plant {
+    fn set_drive(&mut self, enabled: bool, current_limit_a: f64, voltage_limit_v: f64) {
+        self.set_drive(enabled, current_limit_a, voltage_limit_v);
+    }
+    fn current_a(&self) -> f64 {
+        self.current_a()
+    }
+    fn voltage_v(&self) -> f64 {
+        self.voltage_v()
+    }
+    fn temperature_c(&self) -> f64 {
+        self.temperature_c()
+    }
+}
+
+impl EncoderPair for Plant {
+    fn counts_per_rev(&self) -> (u64, u64) {
+        self.counts_per_rev().into()
+    }
+    fn lines(&self) -> (u32, u32) {
+        self.lines().into()
+    }
+}
