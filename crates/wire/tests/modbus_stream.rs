@@ -45,7 +45,8 @@ fn serve(decoder: &mut ServerDecoder, bytes: &[u8]) -> Vec<ServerFrame> {
     frames
 }
 
-/// Delta ASDA-B2 User Manual, chapter 8: reading two words from 0200h.
+/// Delta ASDA-A User Manual (2005), p. 8-9: reading two words from 0200h. The ASDA-B2 manual (2010, p. 8-10) has the same
+/// exchange in ASCII.
 #[test]
 fn manual_example_read() {
     let request = Request::ReadHolding { address: 0x0200, count: 2 };

@@ -260,7 +260,7 @@ fn push_words(frame: &mut Vec<u8>, values: &[u16]) {
 mod tests {
     use super::*;
 
-    // Delta ASDA-B2 User Manual (May 2018), p. 8-13 and 8-14: writing P1-09 and P2-00.
+    // Delta ASDA-B2 User Manual (May 2018), p. 8-13: writing P1-09.
     #[test]
     fn manual_example_write_multiple() {
         let request = Request::WriteMultiple { address: 0x0112, values: vec![0x0BB8, 0x0000] };
@@ -270,6 +270,7 @@ mod tests {
         assert_eq!(answer, [0x01, 0x10, 0x01, 0x12, 0x00, 0x02, 0xE0, 0x31]);
     }
 
+    // Delta ASDA-B2 User Manual (September 2013), p. 8-11: writing P2-00.
     #[test]
     fn manual_example_write_single() {
         let request = Request::WriteSingle { address: 0x0200, value: 0x0064 };
