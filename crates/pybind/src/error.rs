@@ -1,0 +1,140 @@
+//! The one place where errors of the model, of the log and of the binding become Python exceptions.
+
+use std::path::Path;
+
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::{PyErr, create_exception};
+
+create_exception!(
+    gearmodel,
+    GeometryError,
+    PyValueError,
+    "A gear pair that cannot be made, cannot run, or is not described by finite numbers.\n\nThe text names the quantity, \
+     its value and unit, the limit, and what to do next."
+);
+create_exception!(
+    gearmodel,
+    LogError,
+    PyValueError,
+    "A rig log that cannot be understood.\n\nThe text names the file, the place in it, and what to do next. A file that \
+     cannot be opened raises the OSError that the operating system gives."
+);
+
+/// An exception about to be raised. Everything that a binding may fail with converts into it with `?`.
+pub struct Raised(PyErr);
+
+/// What a binding returns.
+pub type Result<T> = std::result::Result<T, Raised>;
+
+impl From<Raised> for PyErr {
+    fn from(raised: Raised) -> Self {
+        raised.0
+    }
+}
+
+impl From<PyErr> for Raised {
+    fn from(error: PyErr) -> Self {
+        Self(error)
+    }
+}
+
+impl From<gearmodel::GeometryError> for Raised {
+    fn from(error: gearmodel::GeometryError) -> Self {
+        Self(GeometryError::new_err(error.to_string()))
+    }
+}
+
+impl From<gearmodel::PairFileError> for Raised {
+    fn from(error: gearmodel::PairFileError) -> Self {
+        Self(GeometryError::new_err(error.to_string()))
+    }
+}
+
+impl From<gearmodel::contact::ContactError> for Raised {
+    fn from(error: gearmodel::contact::ContactError) -> Self {
+        use gearmodel::contact::ContactError;
+        Self(match error {
+            ContactError::NotFinite { .. } => PyValueError::new_err(error.to_string()),
+            _ => GeometryError::new_err(error.to_string()),
+        })
+    }
+}
+
+impl From<gearmodel::ParseDirectionError> for Raised {
+    fn from(error: gearmodel::ParseDirectionError) -> Self {
+        Self(PyValueError::new_err(error.to_string()))
+    }
+}
+
+impl From<InputError> for Raised {
+    fn from(error: InputError) -> Self {
+        Self(match error {
+            InputError::NotNumbers { .. } => PyTypeError::new_err(error.to_string()),
+            InputError::Teeth { .. } => GeometryError::new_err(error.to_string()),
+            _ => PyValueError::new_err(error.to_string()),
+        })
+    }
+}
+
+/// An argument that the model never sees.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    /// Text, complex numbers, times or objects where real numbers are needed.
+    #[error("{field} holds {found}: real numbers are needed, an array or anything numpy.asarray makes one of")]
+    NotNumbers {
+        /// The argument.
+        field: &'static str,
+        /// What it is made of.
+        found: String,
+    },
+    /// Nested sequences of different lengths, or what numpy does not understand.
+    #[error("{field} is no array: {reason}")]
+    NoArray {
+        /// The argument.
+        field: &'static str,
+        /// What numpy says.
+        reason: String,
+    },
+    /// There are two gears.
+    #[error("gear {given} does not exist: write 1 (driver) or 2 (driven)")]
+    Gear {
+        /// The number given.
+        given: i64,
+    },
+    /// A tooth number that is no whole number, or that none of the model holds.
+    #[error("gear {gear} has {given} teeth: whole numbers from 5 to 10000 are accepted")]
+    Teeth {
+        /// 1 = driver, 2 = driven.
+        gear: u8,
+        /// The number given.
+        given: String,
+    },
+    /// A method that does not exist.
+    #[error("method {given:?} is unknown: write \"common_normal\", \"exact\" or \"published\"")]
+    Method {
+        /// The text given.
+        given: String,
+    },
+    /// The printed equations know no load.
+    #[error(
+        "load_nm = {load_nm} N.m with method \"published\": the printed equations know no load; take \"common_normal\" \
+         or \"exact\", or load_nm = 0"
+    )]
+    PublishedLoad {
+        /// The load given.
+        load_nm: f64,
+    },
+    /// A load that is not a number.
+    #[error("load_nm is {load_nm}: a finite torque in N.m is needed")]
+    Load {
+        /// The load given.
+        load_nm: f64,
+    },
+}
+
+/// The OSError of a failure to read or write a file, with the file's name in it.
+pub fn file_error(path: &Path, error: std::io::Error) -> PyErr {
+    let kind = error.kind();
+    let text = format!("{}: {error}", path.display());
+    PyErr::from(std::io::Error::new(kind, text))
+}
