@@ -19,9 +19,7 @@ impl AngleBatch {
     ///
     /// # Errors
     /// The numbers of deltas differ, or counts, time or sample numbers would leave 64 bits.
-    pub fn samples(
-        &self,
-    ) -> Result<impl ExactSizeIterator<Item = (u64, i64, i64)> + '_, BatchError> {
+    pub fn samples(&self) -> Result<impl ExactSizeIterator<Item = (u64, i64, i64)> + '_, BatchError> {
         self.validate()?;
         let (mut time_ns, dt_ns) = (self.t0_ns, u64::from(self.dt_ns));
         let (mut input, mut output) = (self.input_base, self.output_base);
@@ -48,9 +46,7 @@ impl AngleBatch {
         let range = |quantity, start| BatchError::Range { first_sample, quantity, start, samples };
         // A delta has 32 bits, so no sum of n of them leaves ±n·2³¹.
         let reach = (samples as i128) << 31;
-        for (quantity, base) in
-            [("input counts", self.input_base), ("output counts", self.output_base)]
-        {
+        for (quantity, base) in [("input counts", self.input_base), ("output counts", self.output_base)] {
             let base = i128::from(base);
             if base + reach > i128::from(i64::MAX) || base - reach < i128::from(i64::MIN) {
                 return Err(range(quantity, base));
@@ -90,13 +86,7 @@ impl BatchBuilder {
 
     /// Adds sample number `sample`, taken at device time `time_ns`. Returns the batch that this
     /// sample completes or, where the sample does not continue it, the batch before it.
-    pub fn push(
-        &mut self,
-        sample: u64,
-        time_ns: u64,
-        input_counts: i64,
-        output_counts: i64,
-    ) -> Option<AngleBatch> {
+    pub fn push(&mut self, sample: u64, time_ns: u64, input_counts: i64, output_counts: i64) -> Option<AngleBatch> {
         let mut done = None;
         if !self.append(sample, time_ns, input_counts, output_counts) {
             done = self.take();
@@ -175,16 +165,14 @@ mod tests {
 
     fn build(samples: &[(u64, u64, i64, i64)], max: usize) -> Vec<AngleBatch> {
         let mut builder = BatchBuilder::new(max);
-        let mut batches: Vec<_> =
-            samples.iter().filter_map(|&(n, t, i, o)| builder.push(n, t, i, o)).collect();
+        let mut batches: Vec<_> = samples.iter().filter_map(|&(n, t, i, o)| builder.push(n, t, i, o)).collect();
         batches.extend(builder.take());
         batches
     }
 
     #[test]
     fn a_steady_stream_fills_batches_to_the_brim() {
-        let samples: Vec<_> =
-            (0..25u64).map(|n| (n, 1000 + n * 100, n as i64 * 60, -(n as i64) * 30)).collect();
+        let samples: Vec<_> = (0..25u64).map(|n| (n, 1000 + n * 100, n as i64 * 60, -(n as i64) * 30)).collect();
         let batches = build(&samples, 10);
         assert_eq!(batches.iter().map(AngleBatch::len).collect::<Vec<_>>(), [10, 10, 5]);
         assert!(batches.iter().all(|b| b.input_delta[0] == 0 && b.dt_ns == 100));

@@ -182,7 +182,9 @@ pub enum LogError {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum BatchError {
     /// One encoder has more samples than the other.
-    #[error("the batch of sample {first_sample} has {input} input and {output} output deltas; both must be as many: drop the batch and count it as a loss")]
+    #[error(
+        "the batch of sample {first_sample} has {input} input and {output} output deltas; both must be as many: drop the batch and count it as a loss"
+    )]
     Lengths {
         /// The batch's first sample number.
         first_sample: u64,
@@ -192,7 +194,9 @@ pub enum BatchError {
         output: usize,
     },
     /// Counts, time or sample numbers run out of their 64 bits.
-    #[error("the batch of sample {first_sample}: {quantity} leaves 64 bits after {samples} samples from {start}; drop the batch and count it as a loss")]
+    #[error(
+        "the batch of sample {first_sample}: {quantity} leaves 64 bits after {samples} samples from {start}; drop the batch and count it as a loss"
+    )]
     Range {
         /// The batch's first sample number.
         first_sample: u64,

@@ -166,11 +166,7 @@ pub struct AngleScale {
 
 impl AngleScale {
     fn new(sign: i8, index_counts: i64, counts_per_rev: u64) -> Self {
-        Self {
-            signed_tau_rad: f64::from(sign) * TAU,
-            counts_per_rev: counts_per_rev as f64,
-            index_counts,
-        }
+        Self { signed_tau_rad: f64::from(sign) * TAU, counts_per_rev: counts_per_rev as f64, index_counts }
     }
 
     /// The shaft's angle in rad: θ = sign · 2π · (counts − index_counts) / counts_per_rev.

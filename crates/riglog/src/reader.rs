@@ -236,21 +236,15 @@ fn decode(event: Event<'_>) -> Result<Decoded, Undecoded> {
     let Some(topic) = topic else { return Ok(Decoded::Unknown(message.channel)) };
     let (log_time_ns, publish_time_ns, data) = (message.log_time_ns, message.publish_time_ns, message.data);
     let record = match topic {
-        Topic::Angles => {
-            AngleBatch::decode(data).map(|batch| Record::Angles { log_time_ns, publish_time_ns, batch })
-        }
+        Topic::Angles => AngleBatch::decode(data).map(|batch| Record::Angles { log_time_ns, publish_time_ns, batch }),
         Topic::State => RigState::decode(data).map(|state| Record::State { log_time_ns, publish_time_ns, state }),
         Topic::Te => TransmissionError::decode(data).map(|te| Record::Te { log_time_ns, publish_time_ns, te }),
         Topic::Backlash => {
             Backlash::decode(data).map(|backlash| Record::Backlash { log_time_ns, publish_time_ns, backlash })
         }
-        Topic::Events => {
-            foxglove::Log::decode(data).map(|event| Record::Event { log_time_ns, publish_time_ns, event })
-        }
+        Topic::Events => foxglove::Log::decode(data).map(|event| Record::Event { log_time_ns, publish_time_ns, event }),
     };
-    record
-        .map(Decoded::Record)
-        .map_err(|source| Undecoded::Message { topic, log_time_ns, at_byte: chunk_at, source })
+    record.map(Decoded::Record).map_err(|source| Undecoded::Message { topic, log_time_ns, at_byte: chunk_at, source })
 }
 
 fn metadata(name: String, map: MetadataMap) -> Result<Record, LogError> {

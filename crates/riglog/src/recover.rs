@@ -69,9 +69,7 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovery, LogError> {
 ///
 /// # Errors
 /// The directory cannot be listed.
-pub fn recover_directory(
-    directory: impl AsRef<Path>,
-) -> Result<Vec<(PathBuf, Result<Recovery, LogError>)>, LogError> {
+pub fn recover_directory(directory: impl AsRef<Path>) -> Result<Vec<(PathBuf, Result<Recovery, LogError>)>, LogError> {
     let directory = directory.as_ref();
     let entries = match std::fs::read_dir(directory) {
         Ok(entries) => entries,
@@ -149,13 +147,7 @@ fn finalise(mut file: File, path: &Path) -> Result<Recovery, LogError> {
     let mut summary = walk.into_summary();
     let kept_messages = summary.messages();
     if has_end {
-        return Ok(Recovery {
-            path: path.to_owned(),
-            already_complete: true,
-            kept_messages,
-            dropped_bytes: 0,
-            found,
-        });
+        return Ok(Recovery { path: path.to_owned(), already_complete: true, kept_messages, dropped_bytes: 0, found });
     }
     // The writer may have been cut off between a chunk and its indexes: they are made anew.
     let (mut keep, mut end) = (data_end_at, Vec::new());

@@ -183,9 +183,9 @@ impl RunStream {
                 Some(Event::Message { chunk_at, topic: Some(topic @ Topic::Angles), message }) => {
                     // Cleared, the vectors keep their memory from batch to batch.
                     batch.clear();
-                    batch.merge(message.data).map_err(|source| {
-                        bad_message(&self.path, topic, message.log_time_ns, chunk_at, source)
-                    })?;
+                    batch
+                        .merge(message.data)
+                        .map_err(|source| bad_message(&self.path, topic, message.log_time_ns, chunk_at, source))?;
                     batch.validate()?;
                     state.check_time(&batch, &self.path)?;
                     flow = state.batch(&batch);

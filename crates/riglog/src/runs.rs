@@ -128,9 +128,9 @@ pub(crate) fn spans(mut states: Vec<(u64, RigState)>, path: &Path) -> Result<Vec
     for (at_ns, state) in states {
         let set_points = (state.load_setpoint_nm, state.speed_setpoint_rpm);
         let direction = match state.phase() {
-            Phase::Record => Some(
-                state.direction().sense().ok_or_else(|| LogError::NoDirection { path: path.to_owned(), at_ns })?,
-            ),
+            Phase::Record => {
+                Some(state.direction().sense().ok_or_else(|| LogError::NoDirection { path: path.to_owned(), at_ns })?)
+            }
             _ => None,
         };
         if recording && let Some(run) = spans.last_mut() {

@@ -63,8 +63,8 @@ pub(crate) fn survey(path: &Path) -> Result<Survey, LogError> {
                 survey.bounds_ns = Some((first.min(log), last.max(log)));
                 match topic {
                     Some(topic @ Topic::State) => {
-                        let state = RigState::decode(data)
-                            .map_err(|source| bad_message(path, topic, log, chunk_at, source))?;
+                        let state =
+                            RigState::decode(data).map_err(|source| bad_message(path, topic, log, chunk_at, source))?;
                         // A program that leaves the time stamp out gives it as the publish time.
                         let at_ns = state.timestamp.as_ref().and_then(|t| t.as_ns());
                         states.push((at_ns.unwrap_or(message.publish_time_ns), state));

@@ -64,9 +64,7 @@ impl Topic {
 
     /// The topic that a foreign file's channel carries; the name alone does not make it ours.
     pub(crate) fn of_channel(topic: &str, schema: &str, encoding: &str) -> Option<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|t| t.name() == topic && t.schema() == schema && encoding == ENCODING)
+        Self::ALL.into_iter().find(|t| t.name() == topic && t.schema() == schema && encoding == ENCODING)
     }
 }
 

@@ -178,7 +178,7 @@ impl<R: Read + Seek> Walk<R> {
                 Section::Over => return Ok(None),
                 Section::Data => {
                     if let Some(place) = self.step()?
-                        && let Some(found) = self.data_record(place)
+                        && let Some(found) = self.data_record(place)?
                     {
                         return Ok(Some(self.event(found)));
                     }
@@ -278,15 +278,7 @@ impl<R: Read + Seek> Walk<R> {
                 self.completeness.add_truncation(at, Defect::NoEnd);
                 self.section = Section::Over;
             }
-            Ok(Step::Lost(defect)) => {
-                // A whole chunk further on shows that this is damage and not the end.
-                if self.scanner.resync(at + 1).map_err(LogError::io("read", &self.path))? {
-                    self.completeness.add_damage(at, defect);
-                } else {
-                    self.completeness.add_truncation(at, defect);
-                    self.section = Section::Over;
-                }
-            }
+            Ok(Step::Lost(defect)) => self.lost(at, defect)?,
             Err(error) => self.read_error(at, error)?,
         }
         Ok(None)
@@ -302,7 +294,7 @@ impl<R: Read + Seek> Walk<R> {
         Ok(())
     }
 
-    fn data_record(&mut self, place: Place) -> Option<Found> {
+    fn data_record(&mut self, place: Place) -> Result<Option<Found>, LogError> {
         let was_after_chunk = std::mem::replace(&mut self.after_chunk, place.opcode == op::CHUNK);
         let result = match place.opcode {
             op::HEADER => self.header(place).map(|()| None),
@@ -320,18 +312,37 @@ impl<R: Read + Seek> Walk<R> {
             op::ATTACHMENT => self.attachment(place).map(Some),
             op::DATA_END => {
                 self.end_of_data();
-                return None;
+                return Ok(None);
             }
             // Records of other programs' own kinds.
             0x80.. => Ok(None),
             opcode => Err(Defect::Opcode { opcode }),
         };
-        // A record whose content is wrong still has its place in the file.
-        self.data_end_at = place.next;
-        result.unwrap_or_else(|defect| {
-            self.completeness.add_damage(place.at, defect);
-            None
-        })
+        match result {
+            // A chunk whose lengths disagree may have swallowed the next ones.
+            Err(defect @ Defect::Malformed { record: "chunk", .. }) => self.lost(place.at, defect)?,
+            Err(defect) => {
+                self.completeness.add_damage(place.at, defect);
+                // A record whose content is wrong still has its place in the file.
+                self.data_end_at = place.next;
+            }
+            Ok(found) => {
+                self.data_end_at = place.next;
+                return Ok(found);
+            }
+        }
+        Ok(None)
+    }
+
+    /// No whole record stands at `at`: a chunk further on shows that this is damage and not the end.
+    fn lost(&mut self, at: u64, defect: Defect) -> Result<(), LogError> {
+        if self.scanner.resync(at + 1).map_err(LogError::io("read", &self.path))? {
+            self.completeness.add_damage(at, defect);
+        } else {
+            self.completeness.add_truncation(at, defect);
+            self.section = Section::Over;
+        }
+        Ok(())
     }
 
     fn header(&mut self, place: Place) -> Result<(), Defect> {
@@ -506,9 +517,9 @@ impl<R: Read + Seek> Walk<R> {
         match magic.as_ref() {
             None => self.completeness.add_truncation(place.next, Defect::NoEnd),
             Some(MAGIC) => self.has_end = true,
-            Some(_) => self
-                .completeness
-                .add_damage(place.next, Defect::Malformed { record: "file", field: "end magic" }),
+            Some(_) => {
+                self.completeness.add_damage(place.next, Defect::Malformed { record: "file", field: "end magic" })
+            }
         }
         let bytes = self.scanner.file_bytes() - self.scanner.at();
         if magic.is_some() && bytes > 0 {

@@ -73,19 +73,15 @@ impl<'a> Fields<'a> {
     }
 
     pub(crate) fn bytes(&mut self, field: &'static str, length: usize) -> Result<&'a [u8], Defect> {
-        let (taken, rest) = self
-            .rest
-            .split_at_checked(length)
-            .ok_or(Defect::Malformed { record: self.record, field })?;
+        let (taken, rest) =
+            self.rest.split_at_checked(length).ok_or(Defect::Malformed { record: self.record, field })?;
         self.rest = rest;
         Ok(taken)
     }
 
     fn array<const N: usize>(&mut self, field: &'static str) -> Result<[u8; N], Defect> {
-        let (taken, rest) = self
-            .rest
-            .split_first_chunk::<N>()
-            .ok_or(Defect::Malformed { record: self.record, field })?;
+        let (taken, rest) =
+            self.rest.split_first_chunk::<N>().ok_or(Defect::Malformed { record: self.record, field })?;
         self.rest = rest;
         Ok(*taken)
     }

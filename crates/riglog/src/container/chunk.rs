@@ -48,10 +48,6 @@ impl ChunkBuilder {
         self.messages == 0
     }
 
-    pub(crate) fn messages(&self) -> u64 {
-        self.messages
-    }
-
     pub(crate) fn bytes(&self) -> usize {
         self.records.len()
     }
@@ -142,11 +138,7 @@ impl ChunkBuilder {
 }
 
 /// Appends an index record for each channel and returns where each begins.
-pub(crate) fn put_indexes(
-    indexes: &MessageIndexes,
-    at_byte: u64,
-    out: &mut Vec<u8>,
-) -> BTreeMap<u16, u64> {
+pub(crate) fn put_indexes(indexes: &MessageIndexes, at_byte: u64, out: &mut Vec<u8>) -> BTreeMap<u16, u64> {
     let mut offsets = BTreeMap::new();
     for (&channel, entries) in indexes.iter().filter(|(_, entries)| !entries.is_empty()) {
         offsets.insert(channel, at_byte + out.len() as u64);
@@ -195,30 +187,26 @@ pub(crate) struct ChunkView<'a> {
 impl<'a> ChunkView<'a> {
     pub(crate) fn parse(content: &'a [u8]) -> Result<Self, Defect> {
         let mut fields = Fields::new("chunk", content);
-        Ok(Self {
+        let view = Self {
             start_ns: fields.u64("start time")?,
             end_ns: fields.u64("end time")?,
             uncompressed_size: fields.u64("uncompressed size")?,
             crc: fields.u32("checksum")?,
             compression: fields.str("compression")?,
             data: fields.long_bytes("records")?,
-        })
+        };
+        // Two lengths that disagree say that one of them is wrong, and it may be the record's own.
+        if fields.rest().is_empty() { Ok(view) } else { Err(Defect::Malformed { record: "chunk", field: "end" }) }
     }
 
     /// Decompresses into `records` and holds the result against the chunk's checksum.
-    pub(crate) fn decompress(
-        &self,
-        zstd: &mut Decompressor<'static>,
-        records: &mut Vec<u8>,
-    ) -> Result<(), Defect> {
+    pub(crate) fn decompress(&self, zstd: &mut Decompressor<'static>, records: &mut Vec<u8>) -> Result<(), Defect> {
         let (bytes, limit) = (self.uncompressed_size, MAX_RECORD_BYTES);
         if bytes > limit {
             return Err(Defect::TooLarge { what: "a decompressed chunk", bytes, limit });
         }
-        let mismatch = || Defect::Compression {
-            compressed_bytes: self.data.len(),
-            expected_bytes: self.uncompressed_size,
-        };
+        let mismatch =
+            || Defect::Compression { compressed_bytes: self.data.len(), expected_bytes: self.uncompressed_size };
         records.clear();
         match self.compression {
             "" => records.extend_from_slice(self.data),

@@ -137,8 +137,11 @@ impl LogWriter {
         let mut writer = Self {
             path: path.to_owned(),
             tail: Tail::new(store),
-            codec: ChunkCompressor::new(options.compression_level)
-                .map_err(|source| LogError::Compress { path: path.to_owned(), bytes: 0, source })?,
+            codec: ChunkCompressor::new(options.compression_level).map_err(|source| LogError::Compress {
+                path: path.to_owned(),
+                bytes: 0,
+                source,
+            })?,
             chunk: ChunkBuilder::default(),
             chunk_since: now,
             sequences: [0; Topic::ALL.len()],
@@ -344,9 +347,7 @@ impl LogWriter {
         self.check_size("a message", message.encoded_len())?;
         let period_ns = u64::from(self.options.chunk_period_ms) * 1_000_000;
         // The message that would make a chunk longer than its period opens the next one.
-        if !self.chunk.is_empty()
-            && log_time_ns.saturating_sub(self.chunk.first_log_time_ns()) >= period_ns
-        {
+        if !self.chunk.is_empty() && log_time_ns.saturating_sub(self.chunk.first_log_time_ns()) >= period_ns {
             self.close_chunk()?;
         }
         if self.chunk.is_empty() {
@@ -398,9 +399,10 @@ impl LogWriter {
     /// Compresses the chunk under way and hands it over with its indexes.
     fn close_chunk(&mut self) -> Result<(), LogError> {
         let mut records = Vec::new();
-        let index = self.chunk.encode(&mut self.codec, self.tail.at_byte(), &mut records).map_err(|source| {
-            LogError::Compress { path: self.path.clone(), bytes: self.chunk.bytes(), source }
-        })?;
+        let index = self
+            .chunk
+            .encode(&mut self.codec, self.tail.at_byte(), &mut records)
+            .map_err(|source| LogError::Compress { path: self.path.clone(), bytes: self.chunk.bytes(), source })?;
         let mut summary = Summary { chunks: vec![index], ..Default::default() };
         summary.widen(self.chunk.bounds_ns());
         self.chunk.counts().for_each(|(channel, messages)| summary.add_message_count(channel, messages));
@@ -483,5 +485,110 @@ fn lock(file: &File, path: &Path) -> Result<(), LogError> {
         Ok(()) => Ok(()),
         Err(TryLockError::WouldBlock) => Err(LogError::Locked { path: path.to_owned() }),
         Err(TryLockError::Error(source)) => Err(LogError::io("lock", path)(source)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::{super::store::tests::FullDisk, *};
+    use crate::{Completeness, LogReader, Record};
+
+    fn writer(disk: &FullDisk, period_ms: u32) -> LogWriter {
+        let options = WriterOptions { chunk_period_ms: period_ms, ..WriterOptions::new("test") };
+        LogWriter::on(Path::new("x.mcap"), Box::new(disk.clone()), || Ok(()), options).unwrap()
+    }
+
+    fn texts(bytes: &[u8]) -> (Vec<String>, Completeness) {
+        let mut reader = LogReader::over(Cursor::new(bytes), bytes.len() as u64, "x.mcap").unwrap();
+        let texts = reader.by_ref().map(|record| match record.unwrap() {
+            Record::Event { event, .. } => event.message,
+            other => panic!("{other:?}"),
+        });
+        let texts = texts.collect();
+        (texts, reader.completeness().unwrap().clone())
+    }
+
+    const MS: u64 = 1_000_000;
+
+    fn say(log: &mut LogWriter, at_ms: u64, text: &str) -> Result<(), LogError> {
+        log.event(at_ms * MS, at_ms * MS, Level::Info, "t", text)
+    }
+
+    #[test]
+    fn a_chunk_is_closed_by_log_time() {
+        let disk = FullDisk::with_room(1 << 20);
+        let mut log = writer(&disk, 100);
+        let head = disk.bytes().len();
+        say(&mut log, 5, "a").unwrap();
+        say(&mut log, 104, "b").unwrap();
+        assert_eq!(disk.bytes().len(), head, "99 ms are no chunk period");
+        say(&mut log, 105, "c").unwrap();
+        let (seen, completeness) = texts(&disk.bytes());
+        assert_eq!(seen, ["a", "b"]);
+        assert!(matches!(completeness, Completeness::Truncated { .. }));
+        log.finish().unwrap();
+        assert_eq!(texts(&disk.bytes()), (["a", "b", "c"].map(str::to_owned).to_vec(), Completeness::Complete));
+    }
+
+    #[test]
+    fn an_idle_writer_closes_its_chunk_by_wall_time() {
+        let disk = FullDisk::with_room(1 << 20);
+        let mut log = writer(&disk, 5);
+        say(&mut log, 0, "a").unwrap();
+        log.tick().unwrap();
+        std::thread::sleep(Duration::from_millis(6));
+        log.tick().unwrap();
+        assert_eq!(texts(&disk.bytes()).0, ["a"]);
+    }
+
+    #[test]
+    fn a_chunk_is_closed_by_size() {
+        let disk = FullDisk::with_room(1 << 20);
+        let mut log = writer(&disk, 1_000_000);
+        log.options.chunk_bytes = 400;
+        let long = "x".repeat(200);
+        say(&mut log, 0, &long).unwrap();
+        assert!(texts(&disk.bytes()).0.is_empty());
+        say(&mut log, 0, &long).unwrap();
+        assert_eq!(texts(&disk.bytes()).0.len(), 2);
+    }
+
+    #[test]
+    fn a_full_disk_is_told_once_and_the_log_stays_readable_and_may_still_be_saved() {
+        for freed in [false, true] {
+            let disk = FullDisk::with_room(1 << 20);
+            let mut log = writer(&disk, 100);
+            say(&mut log, 0, "a").unwrap();
+            say(&mut log, 100, "b").unwrap();
+            let before = disk.bytes().len();
+            *disk.room.lock().unwrap() = before + 20;
+            let error = say(&mut log, 200, "c").unwrap_err();
+            assert!(matches!(&error, LogError::Write { at_byte, .. } if *at_byte == before as u64), "{error}");
+            assert_eq!(disk.bytes().len(), before, "no half chunk");
+            assert!(matches!(say(&mut log, 201, "d"), Err(LogError::Stopped { .. })));
+            assert!(matches!(log.tick(), Err(LogError::Stopped { .. })));
+            if freed {
+                *disk.room.lock().unwrap() = 1 << 20;
+                log.finish().unwrap();
+                assert_eq!(texts(&disk.bytes()), (["a", "b"].map(str::to_owned).to_vec(), Completeness::Complete));
+            } else {
+                let error = log.finish().unwrap_err();
+                assert!(matches!(error, LogError::Incomplete { lost_messages: 1, finalised: false, .. }), "{error}");
+                let (seen, completeness) = texts(&disk.bytes());
+                assert_eq!(seen, ["a"]);
+                assert!(matches!(completeness, Completeness::Truncated { .. }));
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_too_large_for_any_reader_is_refused() {
+        let disk = FullDisk::with_room(1 << 20);
+        let mut log = writer(&disk, 100);
+        let error = log.attach(0, "big", "", &vec![0; MAX_CONTENT_BYTES]).unwrap_err();
+        assert!(error.to_string().contains("67108867 bytes"), "{error}");
+        log.finish().unwrap();
     }
 }
