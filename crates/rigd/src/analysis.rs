@@ -109,7 +109,9 @@ impl Analysis {
     /// Predicted TE on the grid, at a run's conditions.
     #[must_use]
     pub fn predicted(&self, conditions: &RunConditions) -> Curve {
-        Curve::from_fn(AngleGrid::default(), |theta1| self.model.te_rad(theta1, conditions.direction, conditions.load_nm))
+        Curve::from_fn(AngleGrid::default(), |theta1| {
+            self.model.te_rad(theta1, conditions.direction, conditions.load_nm)
+        })
     }
 
     /// Predicted backlash on the grid.

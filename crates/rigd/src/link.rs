@@ -38,7 +38,9 @@ pub enum LinkError {
         format: String,
     },
     /// The port could not be opened.
-    #[error("{device}: port {port} cannot be opened: {source}; check that the device is plugged in, that no other program holds it, and that you may open it (group dialout)")]
+    #[error(
+        "{device}: port {port} cannot be opened: {source}; check that the device is plugged in, that no other program holds it, and that you may open it (group dialout)"
+    )]
     Open {
         /// Which device.
         device: &'static str,
@@ -73,7 +75,11 @@ impl Address {
             let connect = tokio::net::TcpStream::connect(address);
             let stream = tokio::time::timeout(Duration::from_secs(CONNECT_SECONDS), connect)
                 .await
-                .map_err(|_| LinkError::ConnectTimeout { device: self.device, port: self.port.clone(), seconds: CONNECT_SECONDS })?
+                .map_err(|_| LinkError::ConnectTimeout {
+                    device: self.device,
+                    port: self.port.clone(),
+                    seconds: CONNECT_SECONDS,
+                })?
                 .map_err(failed)?;
             stream.set_nodelay(true).map_err(failed)?;
             return Ok(Box::new(stream));

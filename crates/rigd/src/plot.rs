@@ -42,7 +42,12 @@ pub fn draw(analysis: &Analysis, path: &Path) -> Result<bool, PlotError> {
             Direction::Ccw => ("TE ccw", CCW),
             Direction::Cw => ("TE cw", CW),
         };
-        te.push(Line { name: name.into(), colour, measured: run.te.mean_curve(), predicted: analysis.predicted(&conditions) });
+        te.push(Line {
+            name: name.into(),
+            colour,
+            measured: run.te.mean_curve(),
+            predicted: analysis.predicted(&conditions),
+        });
     }
     let backlash: Vec<Line> = analysis
         .backlash()
@@ -65,8 +70,14 @@ fn render(path: &Path, title: &str, te: &[Line], backlash: &[Line]) -> Result<()
     let root = SVGBackend::new(path, (960, 320 * rows)).into_drawing_area();
     root.fill(&WHITE)?;
     let panels = root.split_evenly((rows as usize, 1));
-    panel(&panels[0], &format!("Transmission error, {title}: measured (points), predicted (lines)"), "TE / µrad", te, false)?;
-    panel(&panels[1], "Measured minus predicted", "ΔTE / µrad", te, true)?;
+    panel(
+        &panels[0],
+        &format!("Transmission error, {title}: measured (points), predicted (lines)"),
+        "TE / µrad",
+        te,
+        false,
+    )?;
+    panel(&panels[1], "What the model leaves: measured minus predicted", "ΔTE / µrad", te, true)?;
     if rows == 3 {
         panel(&panels[2], "Backlash at the driven shaft", "backlash / µrad", backlash, false)?;
     }
@@ -86,7 +97,9 @@ fn panel(
         values
             .iter()
             .enumerate()
-            .map(|(bin, value)| (grid.centre(bin).to_degrees(), (value - reference.map_or(0.0, |curve| curve[bin])) * 1e6))
+            .map(|(bin, value)| {
+                (grid.centre(bin).to_degrees(), (value - reference.map_or(0.0, |curve| curve[bin])) * 1e6)
+            })
             .filter(|(_, value)| value.is_finite())
             .collect()
     };
@@ -98,33 +111,41 @@ fn panel(
             (line, measured, predicted)
         })
         .collect();
-    let values = || series.iter().flat_map(|(_, measured, predicted)| measured.iter().chain(predicted)).map(|(_, value)| *value);
-    let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let values =
+        || series.iter().flat_map(|(_, measured, predicted)| measured.iter().chain(predicted)).map(|(_, value)| *value);
+    let (low, high) =
+        values().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     if low > high {
         return Ok(());
     }
     let margin = (0.06 * (high - low)).max(0.5);
+    // Above the curves: room for the legend.
+    let headroom = 1.0 + 2.0 * lines.len() as f64;
     let mut chart = ChartBuilder::on(area)
         .caption(title, ("sans-serif", 18))
         .margin(8)
         .x_label_area_size(34)
         .y_label_area_size(64)
-        .build_cartesian_2d(0.0..360.0, (low - margin)..(high + margin))?;
+        .build_cartesian_2d((0.0..360.0).step(45.0), (low - margin)..(high + headroom * margin))?;
     chart
         .configure_mesh()
         .x_desc("θ1 / °")
         .y_desc(unit)
-        .x_labels(13)
+        .x_labels(9)
+        .x_label_formatter(&|degrees| format!("{degrees:.0}"))
+        .y_label_formatter(&|value| format!("{value:.*}", usize::from(high - low < 10.0)))
         .light_line_style(TRANSPARENT)
         .bold_line_style(BLACK.mix(0.12))
         .draw()?;
     for (line, measured, predicted) in series {
         let colour = line.colour;
-        // Every other bin: points that can be told from the line below them.
+        // Every fourth bin (2°), open: points that can be told from the line through them.
+        let every = if residual { 1 } else { 4 };
+        let (size, style) = if residual { (1, colour.filled()) } else { (3, colour.stroke_width(1)) };
         chart
-            .draw_series(measured.iter().step_by(2).map(|point| Circle::new(*point, 2, colour.filled())))?
-            .label(format!("{} measured", line.name))
-            .legend(move |(x, y)| Circle::new((x + 10, y), 3, colour.filled()));
+            .draw_series(measured.iter().step_by(every).map(|point| Circle::new(*point, size, style)))?
+            .label(format!("{} {}", line.name, if residual { "measured − predicted" } else { "measured" }))
+            .legend(move |(x, y)| Circle::new((x + 10, y), 3, style));
         if !predicted.is_empty() {
             chart
                 .draw_series(LineSeries::new(predicted, BLACK.mix(0.7).stroke_width(1)))?
@@ -134,7 +155,7 @@ fn panel(
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
+        .position(SeriesLabelPosition::UpperMiddle)
         .background_style(WHITE.mix(0.8))
         .border_style(BLACK.mix(0.2))
         .draw()?;

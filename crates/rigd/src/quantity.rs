@@ -26,10 +26,7 @@ pub struct Kind {
 /// Torque; base unit N·m.
 pub const TORQUE: Kind = Kind {
     name: "torque",
-    units: &[
-        Unit { names: &["Nm", "N·m", "N.m", "N*m"], factor: 1.0 },
-        Unit { names: &["mNm", "mN·m"], factor: 1e-3 },
-    ],
+    units: &[Unit { names: &["Nm", "N·m", "N.m", "N*m"], factor: 1.0 }, Unit { names: &["mNm", "mN·m"], factor: 1e-3 }],
     example: "10Nm",
     bare: false,
     minimum: 0.0,
@@ -49,10 +46,7 @@ pub const SPEED: Kind = Kind {
 /// Sample rate; base unit Hz.
 pub const RATE: Kind = Kind {
     name: "rate",
-    units: &[
-        Unit { names: &["Hz", "S/s"], factor: 1.0 },
-        Unit { names: &["kHz", "kS/s"], factor: 1e3 },
-    ],
+    units: &[Unit { names: &["Hz", "S/s"], factor: 1.0 }, Unit { names: &["kHz", "kS/s"], factor: 1e3 }],
     example: "10kHz",
     bare: false,
     minimum: 0.0,
@@ -113,7 +107,9 @@ pub enum QuantityError {
         example: &'static str,
     },
     /// A range whose parts do not fit.
-    #[error("range '{text}' must be FIRST..LAST with its unit and :STEP, with FIRST <= LAST, STEP > 0 and at most {limit} values; write for instance 5..15Nm:5")]
+    #[error(
+        "range '{text}' must be FIRST..LAST with its unit and :STEP, with FIRST <= LAST, STEP > 0 and at most {limit} values; write for instance 5..15Nm:5"
+    )]
     BadRange {
         /// What was typed.
         text: String,
@@ -151,11 +147,7 @@ impl Kind {
                 let head = &text[..end];
                 head.ends_with(|c: char| c.is_ascii_digit() || c == '.') && head.parse::<f64>().is_ok()
             })
-            .ok_or_else(|| QuantityError::NoNumber {
-                kind: self.name,
-                text: text.to_owned(),
-                example: self.example,
-            })?;
+            .ok_or_else(|| QuantityError::NoNumber { kind: self.name, text: text.to_owned(), example: self.example })?;
         let value = text[..end].parse::<f64>().unwrap_or(f64::NAN);
         Ok((value, text[end..].trim()))
     }
@@ -172,17 +164,15 @@ impl Kind {
                 units: self.unit_names(),
             });
         }
-        self.units
-            .iter()
-            .find(|known| known.names.contains(&unit))
-            .map(|known| known.factor)
-            .ok_or_else(|| QuantityError::WrongUnit {
+        self.units.iter().find(|known| known.names.contains(&unit)).map(|known| known.factor).ok_or_else(|| {
+            QuantityError::WrongUnit {
                 kind: self.name,
                 text: text.to_owned(),
                 unit: unit.to_owned(),
                 example: self.example,
                 units: self.unit_names(),
-            })
+            }
+        })
     }
 
     fn check(&self, text: &str, value: f64) -> Result<f64, QuantityError> {
@@ -263,7 +253,9 @@ mod tests {
 
     #[test]
     fn errors_show_the_right_form() {
-        for (text, needle) in [("10", "no unit"), ("10kg", "'kg'"), ("Nm", "number"), ("-1Nm", ">= 0"), ("1e999Nm", "finite")] {
+        for (text, needle) in
+            [("10", "no unit"), ("10kg", "'kg'"), ("Nm", "number"), ("-1Nm", ">= 0"), ("1e999Nm", "finite")]
+        {
             let said = TORQUE.parse(text).expect_err(text).to_string();
             assert!(said.contains(needle) && said.contains("10Nm"), "{text}: {said}");
         }

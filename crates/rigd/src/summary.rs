@@ -132,7 +132,11 @@ pub struct BacklashFigures {
 fn orders(orders: &[Order]) -> Vec<OrderFigures> {
     orders
         .iter()
-        .map(|order| OrderFigures { order: order.order, amplitude_rad: order.amplitude_rad, phase_rad: order.phase_rad })
+        .map(|order| OrderFigures {
+            order: order.order,
+            amplitude_rad: order.amplitude_rad,
+            phase_rad: order.phase_rad,
+        })
         .collect()
 }
 
@@ -189,7 +193,7 @@ impl Summary {
                     direction: name(conditions.direction),
                     load_nm: conditions.load_nm,
                     speed_rpm: conditions.speed_rpm,
-                    revolutions: figures.coverage,
+                    revolutions: run.te.revolutions() as f64,
                     samples: run.te.samples(),
                     losses: run.losses,
                     duration_s: run.duration_s,
@@ -242,9 +246,18 @@ impl Summary {
             writeln!(out, "  mean             {}", angle(te.mean_rad))?;
             writeln!(out, "  peak-to-peak     {}   predicted {}", angle(te.pp_rad), angle(te.predicted_pp_rad))?;
             writeln!(out, "  rms              {}", angle(te.rms_rad))?;
-            writeln!(out, "  F'is (total)     {}   f'is (tooth to tooth) {}", angle(te.f_is_total_rad), angle(te.f_is_tooth_rad))?;
+            writeln!(
+                out,
+                "  F'is (total)     {}   f'is (tooth to tooth) {}",
+                angle(te.f_is_total_rad),
+                angle(te.f_is_tooth_rad)
+            )?;
             let list = |orders: &[OrderFigures]| {
-                orders.iter().map(|o| format!("{}: {:.2}\"", o.order, arcsec(o.amplitude_rad))).collect::<Vec<_>>().join("  ")
+                orders
+                    .iter()
+                    .map(|o| format!("{}: {:.2}\"", o.order, arcsec(o.amplitude_rad)))
+                    .collect::<Vec<_>>()
+                    .join("  ")
             };
             writeln!(out, "  orders of θ1     {}   predicted {}", list(&te.orders), list(&te.predicted_orders))?;
             writeln!(out, "  offset per rev   {}", angle(te.offset_per_rev_rad))?;
@@ -281,11 +294,8 @@ fn verdict(te: &TeFigures) -> String {
         None => "(one revolution: no repeatability floor; record two or more)".into(),
         Some(floor) => {
             let times = te.residual_rms_rad / floor;
-            let meaning = if times < 3.0 {
-                "the model agrees within the noise"
-            } else {
-                "something is not in the model"
-            };
+            let meaning =
+                if times < 3.0 { "the model agrees within the noise" } else { "something is not in the model" };
             format!("= {times:.1} × the repeatability floor of {} — {meaning}", angle(floor))
         }
     }

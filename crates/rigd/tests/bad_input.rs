@@ -55,7 +55,7 @@ fn limits_are_named_with_value_and_key() {
     refused.expect(&["run", "--load", "500Nm", "--rpm", "5"], &["500", "20", "N·m", "limits.load_nm"]);
     refused.expect(&["run", "--load", "10Nm", "--rpm", "1000"], &["1000", "60", "rpm", "limits.speed_rpm"]);
     refused.expect(&["run", "--load", "20Nm", "--rpm", "60"], &["W", "limits.slip_power_w"]);
-    refused.expect(&["run", "--load", "5Nm", "--rpm", "5", "--rate", "5MHz"], &["5000000", "1 MHz"]);
+    refused.expect(&["run", "--load", "5Nm", "--rpm", "5", "--rate", "5000kHz"], &["5000000", "1 MHz"]);
 }
 
 #[test]
@@ -74,7 +74,10 @@ fn files_are_named_with_line_or_reason() {
     expect(&with("--pair", "/nowhere/pair.toml"), &["/nowhere/pair.toml", "No such file"]);
     let not_toml = refused.file("lab.toml", "name = ");
     expect(&with("--profile", &not_toml), &["lab.toml", "line 1"]);
-    let unknown_key = refused.file("pair.toml", "kind = \"elliptical\"\nmodule_mm = 3.0\nteeth = [47, 47]\neccentricity = 0.3287\ncolour = \"red\"\n");
+    let unknown_key = refused.file(
+        "pair.toml",
+        "kind = \"elliptical\"\nmodule_mm = 3.0\nteeth = [47, 47]\neccentricity = 0.3287\ncolour = \"red\"\n",
+    );
     expect(&with("--pair", &unknown_key), &["pair.toml", "colour"]);
     expect(&with("--undocumented", "gremlins"), &["gremlins", "encoder2_eccentricity"]);
 }

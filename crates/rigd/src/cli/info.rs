@@ -71,7 +71,14 @@ fn text(info: &LogInfo) -> String {
 }
 
 fn write_text(info: &LogInfo, out: &mut String) -> std::fmt::Result {
-    writeln!(out, "{}  {:.2} MB, {:.1} s, by {}", info.path.display(), info.bytes as f64 * 1e-6, info.duration_s, info.library)?;
+    writeln!(
+        out,
+        "{}  {:.2} MB, {:.1} s, by {}",
+        info.path.display(),
+        info.bytes as f64 * 1e-6,
+        info.duration_s,
+        info.library
+    )?;
     writeln!(out, "{}", info.completeness)?;
     for (record, entries) in &info.metadata {
         writeln!(out, "\n{record}")?;

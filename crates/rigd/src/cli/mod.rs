@@ -83,8 +83,6 @@ pub fn main() -> ExitCode {
 }
 
 /// Prints an error with its causes and gives the exit code back.
-
-
 fn fail(exit: Exit, error: &dyn std::error::Error) -> Exit {
     eprintln!("error: {error}");
     let said = error.to_string();

@@ -52,19 +52,23 @@ fn run(args: &Args) -> Result<Exit, Box<dyn std::error::Error>> {
         Some(path) => input::pair(Some(path))?.1,
         None => {
             let text = pair_in_log.ok_or_else(|| ReplayError::NoPair { path: first.clone() })?;
-            input::parse(&text, Path::new("pair.toml")).map_err(|source| ReplayError::Pair { path: first.clone(), source })?
+            input::parse(&text, Path::new("pair.toml"))
+                .map_err(|source| ReplayError::Pair { path: first.clone(), source })?
         }
     };
     let mut analysis = Analysis::new(model);
     let replayed = replay::replay(&args.logs, &mut analysis, args.speed.0)?;
-    let summary = Summary::of(&analysis, Origin {
-        schema: "rigd.replay/1",
-        log: args.logs.iter().map(|path| path.display().to_string()).collect(),
-        backend,
-        losses: replayed.losses,
-        ended: "done".into(),
-        warnings: replayed.incomplete.clone(),
-    });
+    let summary = Summary::of(
+        &analysis,
+        Origin {
+            schema: "rigd.replay/1",
+            log: args.logs.iter().map(|path| path.display().to_string()).collect(),
+            backend,
+            losses: replayed.losses,
+            ended: "done".into(),
+            warnings: replayed.incomplete.clone(),
+        },
+    );
     if args.json {
         print(&serde_json::to_string_pretty(&summary)?);
     } else {

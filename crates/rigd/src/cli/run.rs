@@ -92,11 +92,17 @@ enum TimeScale {
 /// What is refused before anything is opened, moved or written.
 #[derive(Debug, thiserror::Error)]
 enum Refusal {
-    #[error("{option} {value} {unit} is over the limit {limit} {unit} ({key} in profile '{profile}'); lower it, or raise the limit if the rig allows it")]
+    #[error(
+        "{option} {value} {unit} is over the limit {limit} {unit} ({key} in profile '{profile}'); lower it, or raise the limit if the rig allows it"
+    )]
     OverLimit { option: &'static str, value: f64, unit: &'static str, limit: f64, key: &'static str, profile: String },
-    #[error("--load {load_nm} N·m is beyond the brake's calibrated curve or its current limit {limit_a} A (brake.rising, brake.current_limit_a in profile '{profile}'); lower the load, or calibrate further")]
+    #[error(
+        "--load {load_nm} N·m is beyond the brake's calibrated curve or its current limit {limit_a} A (brake.rising, brake.current_limit_a in profile '{profile}'); lower the load, or calibrate further"
+    )]
     BeyondBrake { load_nm: f64, limit_a: f64, profile: String },
-    #[error("--load {load_nm} N·m at --rpm {speed_rpm} makes {power_w:.0} W of heat in the brake, over its {limit_w} W (limits.slip_power_w in profile '{profile}'); lower load or speed")]
+    #[error(
+        "--load {load_nm} N·m at --rpm {speed_rpm} makes {power_w:.0} W of heat in the brake, over its {limit_w} W (limits.slip_power_w in profile '{profile}'); lower load or speed"
+    )]
     TooHot { load_nm: f64, speed_rpm: f64, power_w: f64, limit_w: f64, profile: String },
     #[error("--rate {rate_hz} Hz does not fit the clock of a counter: use 10 Hz to 1 MHz")]
     Rate { rate_hz: f64 },
@@ -148,7 +154,10 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
     if let Some(name) = args.undocumented.iter().find(|name| !sim::is_undocumented(name)) {
         return Err(Box::new(Refusal::Effect { name: name.clone(), known: sim::undocumented_names().join(", ") }));
     }
-    let simulated = [&profile.servo.port, &profile.brake.port, &profile.counter.port].iter().filter(|port| port.as_str() == "sim").count();
+    let simulated = [&profile.servo.port, &profile.brake.port, &profile.counter.port]
+        .iter()
+        .filter(|port| port.as_str() == "sim")
+        .count();
     if simulated == 1 || simulated == 2 {
         return Err(Box::new(Refusal::MixedPorts { profile: profile.name }));
     }
@@ -170,17 +179,31 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
 fn refuse(profile: &Profile, plan: &Plan) -> Result<(), Refusal> {
     let (limits, name) = (&profile.limits, &profile.name);
     let over = |option, value: f64, unit, limit: f64, key| {
-        if value <= limit { Ok(()) } else { Err(Refusal::OverLimit { option, value, unit, limit, key, profile: name.clone() }) }
+        if value <= limit {
+            Ok(())
+        } else {
+            Err(Refusal::OverLimit { option, value, unit, limit, key, profile: name.clone() })
+        }
     };
     over("--rpm", plan.speed_rpm, "rpm", limits.speed_rpm, "limits.speed_rpm")?;
     for &load_nm in &plan.loads_nm {
         over("--load", load_nm, "N·m", limits.load_nm, "limits.load_nm")?;
         if profile.brake.current_a(load_nm).is_none() {
-            return Err(Refusal::BeyondBrake { load_nm, limit_a: profile.brake.current_limit_a, profile: name.clone() });
+            return Err(Refusal::BeyondBrake {
+                load_nm,
+                limit_a: profile.brake.current_limit_a,
+                profile: name.clone(),
+            });
         }
         let power_w = slip_power_w(load_nm, plan.speed_rpm);
         if power_w > limits.slip_power_w {
-            return Err(Refusal::TooHot { load_nm, speed_rpm: plan.speed_rpm, power_w, limit_w: limits.slip_power_w, profile: name.clone() });
+            return Err(Refusal::TooHot {
+                load_nm,
+                speed_rpm: plan.speed_rpm,
+                power_w,
+                limit_w: limits.slip_power_w,
+                profile: name.clone(),
+            });
         }
     }
     if !(10.0..=1e6).contains(&plan.rate_hz) {
@@ -259,9 +282,13 @@ fn execute(args: &Args, setup: Setup, spec: Option<sim::PlantSpec>) -> Exit {
         },
         Some(spec) => {
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
-            in_runtime(runtime, args, setup, |plan| {
-                sim::start_in_process(&spec, plan.rate_hz, seed).map_err(|error| error.to_string())
-            }, Clock::simulated)
+            in_runtime(
+                runtime,
+                args,
+                setup,
+                |plan| sim::start_in_process(&spec, plan.rate_hz, seed).map_err(|error| error.to_string()),
+                Clock::simulated,
+            )
         }
     }
 }
@@ -330,7 +357,10 @@ fn conclude(args: &Args, path: &Path, backend: String, warnings: Vec<String>, ou
     }
     match &outcome.halt {
         None if summary.losses > 0 => {
-            eprintln!("error: {} samples never arrived or were not written; see /rig/events in the log", summary.losses);
+            eprintln!(
+                "error: {} samples never arrived or were not written; see /rig/events in the log",
+                summary.losses
+            );
             Exit::Incomplete
         }
         None if !outcome.troubles.is_empty() => Exit::Halted,
@@ -367,10 +397,15 @@ impl Simulator {
         // A group of its own: Ctrl-C stops the run, and only then the rig.
         command.process_group(0).stdin(Stdio::null()).stdout(Stdio::piped());
         let mut process = command.spawn().map_err(|error| error.to_string())?;
-        let ready = process.stdout.take().is_some_and(|output| {
-            BufReader::new(output).lines().map_while(Result::ok).any(|line| line == "ready")
-        });
-        let profile = if ready { Profile::load(&directory.join("profile.toml")).map_err(|error| error.to_string()) } else { Err("it ended before it was ready".into()) };
+        let ready = process
+            .stdout
+            .take()
+            .is_some_and(|output| BufReader::new(output).lines().map_while(Result::ok).any(|line| line == "ready"));
+        let profile = if ready {
+            Profile::load(&directory.join("profile.toml")).map_err(|error| error.to_string())
+        } else {
+            Err("it ended before it was ready".into())
+        };
         match profile {
             Ok(profile) => Ok(Self { process, directory, profile }),
             Err(error) => {

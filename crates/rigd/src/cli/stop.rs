@@ -49,7 +49,8 @@ impl Drop for Running {
 
 /// Runs the command.
 pub fn main(_: &Args) -> Exit {
-    let entries = std::fs::read_dir(directory()).map(|entries| entries.flatten().collect::<Vec<_>>()).unwrap_or_default();
+    let entries =
+        std::fs::read_dir(directory()).map(|entries| entries.flatten().collect::<Vec<_>>()).unwrap_or_default();
     let mut stopped = 0;
     for entry in entries {
         let path = entry.path();

@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use wire::asda_b2::{
-    ALARM, ALARM_COMMUNICATION_TIMEOUT, AUX_RAM_ONLY, AUXILIARY, Alarm, CONTROL_MODE, FAULT_ACTION, FAULT_STOP, FIRMWARE,
-    FRAME_SILENCE_MS, INPUT_FUNCTIONS, INPUT_SOURCE, INPUTS, InputFunction, MAX_SPEED, MODE_SPEED, OUTPUTS, Outputs, RAMP_DOWN,
-    RAMP_UP, SPEED_1, STATUS_MONITOR, STATUS_MONITOR_CODE, WATCHDOG, monitor,
+    ALARM, ALARM_COMMUNICATION_TIMEOUT, AUX_RAM_ONLY, AUXILIARY, Alarm, CONTROL_MODE, FAULT_ACTION, FAULT_STOP,
+    FIRMWARE, FRAME_SILENCE_MS, INPUT_FUNCTIONS, INPUT_SOURCE, INPUTS, InputFunction, MAX_SPEED, MODE_SPEED, OUTPUTS,
+    Outputs, RAMP_DOWN, RAMP_UP, SPEED_1, STATUS_MONITOR, STATUS_MONITOR_CODE, WATCHDOG, monitor,
 };
 
 use super::bus::{Bus, BusStatistics, Manners};
@@ -36,7 +36,8 @@ struct AsdaB2 {
 /// The driver on an open link.
 #[must_use]
 pub fn open(link: Link, address: Address, profile: &ServoProfile) -> Box<dyn Servo> {
-    let manners = Manners { silence: Duration::from_millis(FRAME_SILENCE_MS), patience: Duration::from_millis(100), attempts: 3 };
+    let manners =
+        Manners { silence: Duration::from_millis(FRAME_SILENCE_MS), patience: Duration::from_millis(100), attempts: 3 };
     Box::new(AsdaB2 { bus: Bus::new(link, address, profile.unit, manners) })
 }
 
@@ -64,8 +65,7 @@ impl AsdaB2 {
     async fn arm_watchdog(&mut self, lease: Duration) -> Result<(), DeviceError> {
         // The register counts whole seconds.
         let seconds = lease.as_secs_f64().ceil();
-        for (register, value, name) in
-            [(&WATCHDOG, seconds, "P3-04"), (&FAULT_ACTION, f64::from(FAULT_STOP), "P3-03")]
+        for (register, value, name) in [(&WATCHDOG, seconds, "P3-04"), (&FAULT_ACTION, f64::from(FAULT_STOP), "P3-03")]
         {
             self.bus.set(register, value).await?;
             let read = self.bus.get(register).await?;

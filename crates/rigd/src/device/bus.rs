@@ -9,8 +9,8 @@ use std::time::Duration;
 use thiserror::Error;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::time::{Instant, timeout_at};
-use wire::register_map::{RegisterDef, RegisterError};
 use wire::modbus::{self, ClientDecoder, ExceptionCode, Request, Response};
+use wire::register_map::{RegisterDef, RegisterError};
 
 use crate::link::{Address, Link};
 
@@ -42,7 +42,9 @@ pub struct BusStatistics {
 #[derive(Debug, Error)]
 pub enum BusError {
     /// No answer.
-    #[error("{device} on {port} (unit {unit}) did not answer {attempts} requests ({request}) within {patience_ms} ms each; check power, cable, baud {baud} {format}, and the unit number")]
+    #[error(
+        "{device} on {port} (unit {unit}) did not answer {attempts} requests ({request}) within {patience_ms} ms each; check power, cable, baud {baud} {format}, and the unit number"
+    )]
     Silent {
         /// Which device.
         device: &'static str,
@@ -62,7 +64,9 @@ pub enum BusError {
         format: String,
     },
     /// Only damaged answers.
-    #[error("{device} on {port} (unit {unit}) answered {request} with a damaged frame {attempts} times, last: {reason}; check wiring, termination, baud {baud} {format}, and that no second device has this unit number")]
+    #[error(
+        "{device} on {port} (unit {unit}) answered {request} with a damaged frame {attempts} times, last: {reason}; check wiring, termination, baud {baud} {format}, and that no second device has this unit number"
+    )]
     Damaged {
         /// Which device.
         device: &'static str,
@@ -126,7 +130,9 @@ pub enum BusError {
         reason: String,
     },
     /// A written value came back otherwise.
-    #[error("{device} on {port}: register {register:#06x} was written {wrote:?} and reads back {read:?}; is the parameter locked, or another master on the line?")]
+    #[error(
+        "{device} on {port}: register {register:#06x} was written {wrote:?} and reads back {read:?}; is the parameter locked, or another master on the line?"
+    )]
     ReadBack {
         /// Which device.
         device: &'static str,
@@ -163,7 +169,15 @@ impl Bus {
     pub fn new(link: Link, address: Address, unit: u8, manners: Manners) -> Self {
         let silence = modbus::inter_frame_silence(address.baud);
         let manners = Manners { silence: manners.silence.max(silence), ..manners };
-        Self { link, address, unit, manners, quiet_since: Instant::now(), suspect: true, statistics: BusStatistics::default() }
+        Self {
+            link,
+            address,
+            unit,
+            manners,
+            quiet_since: Instant::now(),
+            suspect: true,
+            statistics: BusStatistics::default(),
+        }
     }
 
     /// What happened so far.
@@ -279,20 +293,33 @@ impl Bus {
                 }
             }
         }
-        let (device, port, unit, attempts) = (self.address.device, self.address.port.clone(), self.unit, self.manners.attempts);
+        let (device, port, unit, attempts) =
+            (self.address.device, self.address.port.clone(), self.unit, self.manners.attempts);
         let (baud, format, request) = (self.address.baud, self.address.format.clone(), request.to_string());
         Err(match last {
-            Attempt::TimedOut => {
-                BusError::Silent { device, port, unit, attempts, request, patience_ms: self.manners.patience.as_millis(), baud, format }
+            Attempt::TimedOut => BusError::Silent {
+                device,
+                port,
+                unit,
+                attempts,
+                request,
+                patience_ms: self.manners.patience.as_millis(),
+                baud,
+                format,
+            },
+            Attempt::Damaged(reason) => {
+                BusError::Damaged { device, port, unit, attempts, request, reason, baud, format }
             }
-            Attempt::Damaged(reason) => BusError::Damaged { device, port, unit, attempts, request, reason, baud, format },
         })
     }
 
     async fn attempt(&mut self, request: &Request) -> Result<Result<Response, Attempt>, BusError> {
         tokio::time::sleep_until(self.quiet_since + self.manners.silence).await;
-        let frame = modbus::encode_request(self.unit, request)
-            .map_err(|reason| BusError::Unaskable { device: self.address.device, request: request.to_string(), reason })?;
+        let frame = modbus::encode_request(self.unit, request).map_err(|reason| BusError::Unaskable {
+            device: self.address.device,
+            request: request.to_string(),
+            reason,
+        })?;
         self.send(&frame).await?;
         // 11 bits a character at most; both frames pass the wire before patience begins.
         let characters = frame.len() + request.response_len();

@@ -6,7 +6,9 @@ use std::time::Duration;
 use async_trait::async_trait;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::time::{Instant, timeout_at};
-use wire::counter_box::{AckStatus, Command, Encoder, Frame, MAX_SAMPLES_PER_FRAME, PROTOCOL_VERSION, Samples, StreamDecoder};
+use wire::counter_box::{
+    AckStatus, Command, Encoder, Frame, MAX_SAMPLES_PER_FRAME, PROTOCOL_VERSION, Samples, StreamDecoder,
+};
 
 use super::{Counter, CounterIdentity, DeviceError};
 use crate::link::{Address, Link};
@@ -121,10 +123,14 @@ impl Counter for CounterBox {
         self.command("stop", |request_id| Command::Stop { request_id }).await?;
         self.samples.clear();
         let identity = self
-            .ask("identify", |request_id| Command::Identify { request_id }, |frame, request| match frame {
-                Frame::Identity(identity) if identity.request_id == request => Some(identity.clone()),
-                _ => None,
-            })
+            .ask(
+                "identify",
+                |request_id| Command::Identify { request_id },
+                |frame, request| match frame {
+                    Frame::Identity(identity) if identity.request_id == request => Some(identity.clone()),
+                    _ => None,
+                },
+            )
             .await?;
         if identity.protocol_version != PROTOCOL_VERSION {
             return Err(DeviceError::Unexpected {

@@ -78,7 +78,9 @@ pub enum DeviceError {
         expected: String,
     },
     /// A value is beyond what the device takes.
-    #[error("{device} on {port}: {quantity} = {value} {unit} is beyond the device's {limit} {unit}; lower it, or correct the profile")]
+    #[error(
+        "{device} on {port}: {quantity} = {value} {unit} is beyond the device's {limit} {unit}; lower it, or correct the profile"
+    )]
     Range {
         /// Which device.
         device: &'static str,
@@ -124,7 +126,9 @@ pub enum DeviceError {
         alarm: String,
     },
     /// The servo has no watchdog of its own.
-    #[error("servo on {port}: register {register} (communication watchdog) reads back {read}, wanted {wanted}; without it the motor turns on when this program dies")]
+    #[error(
+        "servo on {port}: register {register} (communication watchdog) reads back {read}, wanted {wanted}; without it the motor turns on when this program dies"
+    )]
     NoWatchdog {
         /// Its port.
         port: String,
@@ -190,16 +194,17 @@ pub trait Counter {
     fn damaged_frames(&self) -> u64;
 }
 
-type Factory<P, D> = fn(Link, Address, &P) -> D;
+/// Drivers by their name in the profile: each is opened on its link.
+type Drivers<P, D> = &'static [(&'static str, fn(Link, Address, &P) -> Box<D>)];
 
 /// Servo drives by their name in the profile.
-pub const SERVOS: &[(&str, Factory<ServoProfile, Box<dyn Servo>>)] = &[("asda-b2", asda_b2::open)];
+pub const SERVOS: Drivers<ServoProfile, dyn Servo> = &[("asda-b2", asda_b2::open)];
 
 /// Brake drivers by their name in the profile.
-pub const BRAKES: &[(&str, Factory<BrakeProfile, Box<dyn Brake>>)] = &[("rd60xx", rd60xx::open)];
+pub const BRAKES: Drivers<BrakeProfile, dyn Brake> = &[("rd60xx", rd60xx::open)];
 
 /// Encoder readers by their name in the profile.
-pub const COUNTERS: &[(&str, Factory<CounterProfile, Box<dyn Counter>>)] = &[("counter-box", counter_box::open)];
+pub const COUNTERS: Drivers<CounterProfile, dyn Counter> = &[("counter-box", counter_box::open)];
 
 /// A driver's name that is in no list.
 #[derive(Debug, Error)]

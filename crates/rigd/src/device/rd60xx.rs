@@ -38,7 +38,9 @@ impl Brake for Rd60xx {
         self.map = Map::new(model);
         let serial = u32::from(words[1]) << 16 | u32::from(words[2]);
         let firmware = f64::from(words[3]) / 100.0;
-        Ok(Identity { text: format!("Riden {model:?}, serial {serial:08}, firmware {firmware:.2}, on {}", self.bus.port()) })
+        Ok(Identity {
+            text: format!("Riden {model:?}, serial {serial:08}, firmware {firmware:.2}, on {}", self.bus.port()),
+        })
     }
 
     fn max_current_a(&self) -> f64 {

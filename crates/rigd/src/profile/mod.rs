@@ -275,7 +275,11 @@ impl Profile {
             let finite = branch.iter().flatten().all(|value| value.is_finite() && *value >= 0.0);
             let increasing = branch.windows(2).all(|pair| pair[1][0] > pair[0][0] && pair[1][1] > pair[0][1]);
             if branch.len() < 2 || !finite || !increasing {
-                return refuse(key, format!("{branch:?}"), "two points or more, current and torque both increasing from >= 0".into());
+                return refuse(
+                    key,
+                    format!("{branch:?}"),
+                    "two points or more, current and torque both increasing from >= 0".into(),
+                );
             }
         }
         Ok(())
@@ -364,7 +368,13 @@ mod tests {
     fn refusals_name_key_value_and_limit() {
         let wrong = SIM_PROFILE.replace("chunk_ms = 100", "chunk_ms = 5000");
         let said = Profile::parse(&wrong, Path::new("lab.toml")).expect_err("too long").to_string();
-        assert!(said.contains("lab.toml") && said.contains("log.chunk_ms") && said.contains("5000") && said.contains("100 ms"), "{said}");
+        assert!(
+            said.contains("lab.toml")
+                && said.contains("log.chunk_ms")
+                && said.contains("5000")
+                && said.contains("100 ms"),
+            "{said}"
+        );
         let unknown = SIM_PROFILE.replace("lease_s", "leese_s");
         let said = Profile::parse(&unknown, Path::new("lab.toml")).expect_err("unknown key").to_string();
         assert!(said.contains("leese_s"), "{said}");

@@ -1,9 +1,9 @@
 //! From the counter's batches to the log and to live TE: losses are counted, runs begin and end at exact samples.
 
-use gearmodel::measure::{AngleGrid, RunConditions};
 use gearmodel::Direction;
-use riglog::proto::{self, AngleBatch, Phase, RigState, Timestamp};
+use gearmodel::measure::{AngleGrid, RunConditions};
 use riglog::proto::Level;
+use riglog::proto::{self, AngleBatch, Phase, RigState, Timestamp};
 use riglog::{AngleScale, EncoderMetadata};
 use wire::counter_box::{SampleFlags, Samples};
 
@@ -37,9 +37,19 @@ pub struct Status {
 enum Recording {
     Idle,
     /// Begins at the next bin edge.
-    Armed { conditions: RunConditions, revolutions: f64 },
+    Armed {
+        conditions: RunConditions,
+        revolutions: f64,
+    },
     /// Ends when θ1 has gone `extent_rad` from the edge where it began.
-    Active { edge_rad: f64, extent_rad: f64, sense: f64, first_sample: u64, began_ns: u64, lost_before: u64 },
+    Active {
+        edge_rad: f64,
+        extent_rad: f64,
+        sense: f64,
+        first_sample: u64,
+        began_ns: u64,
+        lost_before: u64,
+    },
     Done,
 }
 
@@ -205,7 +215,11 @@ impl Acquisition {
     /// The encoder whose index has not been seen.
     #[must_use]
     pub fn missing_index(&self) -> Option<&'static str> {
-        ["input", "output"].into_iter().zip(self.index_counts).find(|(_, latched)| latched.is_none()).map(|(which, _)| which)
+        ["input", "output"]
+            .into_iter()
+            .zip(self.index_counts)
+            .find(|(_, latched)| latched.is_none())
+            .map(|(which, _)| which)
     }
 
     /// Takes the index as zero of both angles and writes the encoders' metadata.
@@ -225,7 +239,7 @@ impl Acquisition {
         self.homed = true;
         self.previous_theta1_rad = None;
         let now = self.clock.now_ns();
-        self.recorder.write(now, now, Entry::Encoders(self.encoders.clone()));
+        self.recorder.write(now, now, Entry::Encoders(self.encoders));
     }
 
     /// Records `revolutions` whole turns from the next bin edge on.
@@ -347,7 +361,8 @@ impl Acquisition {
             match &self.recording {
                 Recording::Armed { conditions, .. } => {
                     let direction = conditions.direction;
-                    let edge = self.previous_theta1_rad.and_then(|previous| edge_between(grid, previous, theta1, direction));
+                    let edge =
+                        self.previous_theta1_rad.and_then(|previous| edge_between(grid, previous, theta1, direction));
                     self.previous_theta1_rad = Some(theta1);
                     let Some(edge_rad) = edge else { continue };
                     self.write_part(batch, first_ns, arrived, written, index);

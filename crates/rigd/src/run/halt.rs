@@ -43,10 +43,14 @@ pub enum Halt {
         alarm: u16,
     },
     /// The brake's driver has switched itself off.
-    #[error("brake driver: its protection has tripped (over-voltage or over-current); check the coil and its cable, then reset it at the panel")]
+    #[error(
+        "brake driver: its protection has tripped (over-voltage or over-current); check the coil and its cable, then reset it at the panel"
+    )]
     BrakeTripped,
     /// The encoders fell silent.
-    #[error("no encoder sample for {silent_ms:.0} ms (limit {limit_ms:.0} ms, limits.encoder_silence_ms); check the counter's cable and power")]
+    #[error(
+        "no encoder sample for {silent_ms:.0} ms (limit {limit_ms:.0} ms, limits.encoder_silence_ms); check the counter's cable and power"
+    )]
     EncodersSilent {
         /// How long.
         silent_ms: f64,
@@ -54,7 +58,9 @@ pub enum Halt {
         limit_ms: f64,
     },
     /// The index was not found.
-    #[error("the index of the {which} encoder was not seen in {turns:.1} turns of the driver; check its index line and that its shaft turns")]
+    #[error(
+        "the index of the {which} encoder was not seen in {turns:.1} turns of the driver; check its index line and that its shaft turns"
+    )]
     NoIndex {
         /// Which encoder.
         which: &'static str,
@@ -62,7 +68,9 @@ pub enum Halt {
         turns: f64,
     },
     /// Something took too long.
-    #[error("{what} took longer than {seconds:.0} s (now {now}); is the shaft blocked, or a limit of the drive too low?")]
+    #[error(
+        "{what} took longer than {seconds:.0} s (now {now}); is the shaft blocked, or a limit of the drive too low?"
+    )]
     TooLong {
         /// What.
         what: &'static str,

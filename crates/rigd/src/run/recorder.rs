@@ -10,8 +10,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use riglog::proto::{AngleBatch, Backlash, RigState, TransmissionError};
 use riglog::proto::Level;
+use riglog::proto::{AngleBatch, Backlash, RigState, TransmissionError};
 use riglog::{EncoderMetadata, LogError, LogStatistics, LogWriter, RunMetadata, WriterOptions};
 
 /// Messages that may wait for the recorder: 80 s at 100 batches a second.

@@ -166,22 +166,55 @@ impl Rig {
             if value > limit { Err(Halt::Limit { quantity, value, limit, unit, key, advice }) } else { Ok(()) }
         };
         // The ramp may overshoot a setpoint at the limit by a little.
-        over("driver speed", rig.latest.speed_rpm.abs(), limits.speed_rpm * 1.1, "rpm", "limits.speed_rpm, and a tenth", "check servo.reduction and the drive's tuning")?;
-        over("brake temperature", rig.status.brake_temperature_c, limits.brake_temperature_c, "°C", "limits.brake_temperature_c", "let the brake cool, or lower load or speed")?;
-        over("TE excursion", rig.latest.excursion_rad * 1e3, limits.te_excursion_mrad, "mrad", "limits.te_excursion_mrad", "inspect the teeth before the next run")?;
+        over(
+            "driver speed",
+            rig.latest.speed_rpm.abs(),
+            limits.speed_rpm * 1.1,
+            "rpm",
+            "limits.speed_rpm, and a tenth",
+            "check servo.reduction and the drive's tuning",
+        )?;
+        over(
+            "brake temperature",
+            rig.status.brake_temperature_c,
+            limits.brake_temperature_c,
+            "°C",
+            "limits.brake_temperature_c",
+            "let the brake cool, or lower load or speed",
+        )?;
+        over(
+            "TE excursion",
+            rig.latest.excursion_rad * 1e3,
+            limits.te_excursion_mrad,
+            "mrad",
+            "limits.te_excursion_mrad",
+            "inspect the teeth before the next run",
+        )?;
         // Heat account: what goes in above the continuous power leaves at the same rate; a minute's worth is the limit.
         let seconds = self.heat_updated.elapsed().as_secs_f64();
         self.heat_updated = Instant::now();
         let power_w = slip_power_w(rig.status.load_nm, rig.latest.speed_rpm);
         self.slip_heat_j = (self.slip_heat_j + (power_w - limits.slip_power_w) * seconds).max(0.0);
-        over("brake heat account", self.slip_heat_j, limits.slip_power_w * 60.0, "J", "60 s of limits.slip_power_w", "lower load or speed, or pause between runs")
+        over(
+            "brake heat account",
+            self.slip_heat_j,
+            limits.slip_power_w * 60.0,
+            "J",
+            "60 s of limits.slip_power_w",
+            "lower load or speed, or pause between runs",
+        )
     }
 
     /// Polls until `done`; an error when it takes longer than `seconds`.
     ///
     /// # Errors
     /// [`Halt`], among them [`Halt::TooLong`].
-    pub async fn until(&mut self, what: &'static str, seconds: f64, mut done: impl FnMut(&Acquisition) -> bool) -> Result<(), Halt> {
+    pub async fn until(
+        &mut self,
+        what: &'static str,
+        seconds: f64,
+        mut done: impl FnMut(&Acquisition) -> bool,
+    ) -> Result<(), Halt> {
         let deadline = Instant::now() + Duration::from_secs_f64(seconds);
         loop {
             self.tick().await?;
@@ -276,10 +309,10 @@ impl Rig {
                 troubles.push(format!("brake was not switched off: {error}; switch it off at its panel"));
             }
         }
-        if let Err(error) = self.servo.set_enabled(false).await {
-            if !servo_lost {
-                troubles.push(format!("servo was not switched off: {error}; switch it off by hand"));
-            }
+        if let Err(error) = self.servo.set_enabled(false).await
+            && !servo_lost
+        {
+            troubles.push(format!("servo was not switched off: {error}; switch it off by hand"));
         }
         if let Some(stream) = self.stream.take() {
             stream.end.notify_one();
@@ -313,7 +346,11 @@ impl Rig {
                 return false;
             }
             if Instant::now() > deadline {
-                let reason = if fresh { format!("the driver still turns at {:.3} rpm", rig.latest.speed_rpm) } else { "the encoders are silent".into() };
+                let reason = if fresh {
+                    format!("the driver still turns at {:.3} rpm", rig.latest.speed_rpm)
+                } else {
+                    "the encoders are silent".into()
+                };
                 troubles.push(format!("standstill could not be confirmed: {reason}"));
                 rig.event(Level::Error, "stop", "standstill could not be confirmed".into());
                 return false;

@@ -38,7 +38,11 @@ async fn prepare(rig: &mut Rig, mut counter: Box<dyn Counter>, plan: &Plan) -> R
         let mut acquisition = rig.acquisition.borrow_mut();
         let signs = [rig.profile.counter.input_sign, rig.profile.counter.output_sign];
         acquisition.set_encoders(&encoders, signs);
-        acquisition.event(Level::Info, "identity", format!("servo {}; brake {}; counter {}", servo.text, brake.text, encoders.text));
+        acquisition.event(
+            Level::Info,
+            "identity",
+            format!("servo {}; brake {}; counter {}", servo.text, brake.text, encoders.text),
+        );
     }
     refuse_over_limit(rig, &encoders, plan).await?;
     counter.start(plan.rate_hz).await?;
@@ -75,11 +79,14 @@ async fn home(rig: &mut Rig) -> Result<(), Halt> {
     rig.set_load(0.0).await?;
     rig.set_speed(Some(Direction::Ccw), speed).await?;
     // Both indices pass within one turn of either gear; a half more forgives the ramp.
-    let patience = rig.ramp_s(speed) + 60.0 / speed * 1.5 / rig.acquisition.borrow().analysis().model().pair.closure().min(1.0);
+    let patience =
+        rig.ramp_s(speed) + 60.0 / speed * 1.5 / rig.acquisition.borrow().analysis().model().pair.closure().min(1.0);
     let outcome = rig.until("homing", patience, super::acquire::Acquisition::index_seen).await;
     if let Err(Halt::TooLong { .. }) = outcome {
         let acquisition = rig.acquisition.borrow();
-        return Err(acquisition.missing_index().map_or(Halt::Operator, |which| Halt::NoIndex { which, turns: patience * speed / 60.0 }));
+        return Err(acquisition
+            .missing_index()
+            .map_or(Halt::Operator, |which| Halt::NoIndex { which, turns: patience * speed / 60.0 }));
     }
     outcome?;
     rig.acquisition.borrow_mut().home();
@@ -103,7 +110,8 @@ async fn approach(rig: &mut Rig, plan: &Plan, direction: Direction, load_nm: f64
     rig.set_speed(Some(direction), plan.speed_rpm).await?;
     let speed = plan.speed_rpm;
     let patience = rig.ramp_s(speed) + 2.0;
-    rig.until("the ramp to speed", patience, move |a| (signed(a.latest.speed_rpm) - speed).abs() < 0.05 * speed).await?;
+    rig.until("the ramp to speed", patience, move |a| (signed(a.latest.speed_rpm) - speed).abs() < 0.05 * speed)
+        .await?;
     rig.set_load(load_nm).await?;
     rig.hold(rig.profile.sequence.load_s).await?;
 

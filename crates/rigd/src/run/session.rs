@@ -82,11 +82,14 @@ struct Devices {
 /// # Errors
 /// [`LogError`] when the log cannot be made.
 pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -> Result<Outcome, LogError> {
-    let recorder = Recorder::create(&setup.path, WriterOptions {
-        chunk_period_ms: setup.profile.log.chunk_ms,
-        sync_period_ms: setup.profile.log.sync_ms,
-        ..WriterOptions::new(SOFTWARE)
-    })?;
+    let recorder = Recorder::create(
+        &setup.path,
+        WriterOptions {
+            chunk_period_ms: setup.profile.log.chunk_ms,
+            sync_period_ms: setup.profile.log.sync_ms,
+            ..WriterOptions::new(SOFTWARE)
+        },
+    )?;
     describe(&recorder, &setup, clock);
     let analysis = Analysis::new(setup.model.clone());
     let acquisition = Rc::new(RefCell::new(Acquisition::new(recorder, clock, analysis)));
@@ -95,7 +98,15 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
 
     let (halt, mut troubles) = match connect(&setup.profile, links).await {
         Ok(devices) => {
-            let mut rig = Rig::new(setup.profile.clone(), devices.servo, devices.brake, Rc::clone(&acquisition), clock, stop, progress);
+            let mut rig = Rig::new(
+                setup.profile.clone(),
+                devices.servo,
+                devices.brake,
+                Rc::clone(&acquisition),
+                clock,
+                stop,
+                progress,
+            );
             let halt = sequence::execute(&mut rig, devices.counter, &setup.plan).await.err();
             if let Some(halt) = &halt {
                 acquisition.borrow().event(Level::Error, "halt", halt.to_string());
@@ -113,9 +124,7 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
         acquisition.borrow().event(Level::Error, "switch-off", trouble.clone());
     }
     // The reader's task has ended with the rig, so ours is the last hold on the acquisition.
-    let Some(acquisition) = Rc::into_inner(acquisition) else {
-        unreachable!("the rig and its tasks are gone")
-    };
+    let Some(acquisition) = Rc::into_inner(acquisition) else { unreachable!("the rig and its tasks are gone") };
     let acquisition = acquisition.into_inner();
     let lost = acquisition.lost();
     let (recorder, analysis) = acquisition.into_parts();
@@ -137,27 +146,34 @@ fn describe(recorder: &Recorder, setup: &Setup, clock: Clock) {
     let plan = &setup.plan;
     let now = clock.now_ns();
     let directions: Vec<_> = plan.directions.iter().map(ToString::to_string).collect();
-    recorder.write(now, now, Entry::Run(Box::new(RunMetadata {
-        run_id: uuid::Uuid::new_v4().to_string(),
-        started: jiff::Timestamp::now().to_string(),
-        software: SOFTWARE.into(),
-        host: nix::unistd::gethostname().ok().and_then(|name| name.into_string().ok()).unwrap_or_default(),
-        backend: setup.profile.name.clone(),
-        operator: setup.operator.clone(),
-        note: setup.note.clone(),
-        direction: directions.join(","),
-        load_nm: plan.loads_nm.clone(),
-        speed_rpm: vec![plan.speed_rpm],
-        revolutions: Some(plan.revolutions),
-    })));
-    let attach = |name, text: &str| recorder.write(now, now, Entry::Attachment(name, "application/toml", text.as_bytes().to_vec()));
+    recorder.write(
+        now,
+        now,
+        Entry::Run(Box::new(RunMetadata {
+            run_id: uuid::Uuid::new_v4().to_string(),
+            started: jiff::Timestamp::now().to_string(),
+            software: SOFTWARE.into(),
+            host: nix::unistd::gethostname().ok().and_then(|name| name.into_string().ok()).unwrap_or_default(),
+            backend: setup.profile.name.clone(),
+            operator: setup.operator.clone(),
+            note: setup.note.clone(),
+            direction: directions.join(","),
+            load_nm: plan.loads_nm.clone(),
+            speed_rpm: vec![plan.speed_rpm],
+            revolutions: Some(plan.revolutions),
+        })),
+    );
+    let attach = |name, text: &str| {
+        recorder.write(now, now, Entry::Attachment(name, "application/toml", text.as_bytes().to_vec()))
+    };
     attach("pair.toml", &setup.pair_toml);
     attach("rig.toml", &setup.profile.to_toml());
 }
 
 async fn connect(profile: &Profile, links: Links) -> Result<Devices, Halt> {
     let (servo, brake, counter) = (&profile.servo, &profile.brake, &profile.counter);
-    let address = |device, port: &str, baud, format: &str| Address { device, port: port.into(), baud, format: format.into() };
+    let address =
+        |device, port: &str, baud, format: &str| Address { device, port: port.into(), baud, format: format.into() };
     let at_servo = address("servo", &servo.port, servo.baud, &servo.format);
     let at_brake = address("brake", &brake.port, brake.baud, &brake.format);
     let at_counter = address("counter", &counter.port, counter.baud, &counter.format);

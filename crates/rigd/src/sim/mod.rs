@@ -105,10 +105,10 @@ pub fn spec(model: &NominalModel, undocumented: &[String]) -> Result<PlantSpec, 
     spec.shafts.compliance_input_rad_per_nm = errors.shaft_compliance_input_rad_per_nm;
     spec.mesh.compliance_mm2_rad_per_nm = errors.mesh_compliance_mm2_rad_per_nm;
     for name in undocumented {
-        let (.., apply) = UNDOCUMENTED.iter().find(|(known, ..)| known == name).ok_or_else(|| SimError::Effect {
-            name: name.clone(),
-            known: undocumented_names().join(", "),
-        })?;
+        let (.., apply) = UNDOCUMENTED
+            .iter()
+            .find(|(known, ..)| known == name)
+            .ok_or_else(|| SimError::Effect { name: name.clone(), known: undocumented_names().join(", ") })?;
         apply(&mut spec);
     }
     Ok(spec)
@@ -133,7 +133,13 @@ pub fn start_in_process(spec: &PlantSpec, rate_hz: f64, seed: u64) -> Result<Lin
 ///
 /// # Errors
 /// [`SimError`] when the plant cannot be built or a port cannot be made.
-pub async fn serve_ptys(spec: &PlantSpec, seed: u64, directory: &Path, profile: &Profile, stop: StopRequests) -> Result<(), SimError> {
+pub async fn serve_ptys(
+    spec: &PlantSpec,
+    seed: u64,
+    directory: &Path,
+    profile: &Profile,
+    stop: StopRequests,
+) -> Result<(), SimError> {
     use std::io::Write as _;
     let io = |what: String| move |source| SimError::Io { what, source };
     let directory = directory.canonicalize().map_err(io(format!("directory {}", directory.display())))?;
@@ -142,7 +148,8 @@ pub async fn serve_ptys(spec: &PlantSpec, seed: u64, directory: &Path, profile: 
         let path = directory.join(name);
         Terminal::at(&path).map_err(io(format!("port {}", path.display())))
     };
-    let ((servo, at_servo), (brake, at_brake), (counter, at_counter)) = (port("servo")?, port("brake")?, port("counter")?);
+    let ((servo, at_servo), (brake, at_brake), (counter, at_counter)) =
+        (port("servo")?, port("brake")?, port("counter")?);
     let mut profile = profile.clone();
     let at = |name: &str| directory.join(name).display().to_string();
     (profile.servo.port, profile.brake.port, profile.counter.port) = (at("servo"), at("brake"), at("counter"));

@@ -6,7 +6,9 @@ use tokio::time::Instant;
 use wire::modbus::Request;
 use wire::rd60xx::Model;
 
-use super::emulator::{BrakeCoil, BrakeEmulator, CounterEmulator, EncoderPair, Latched, Reply, ServoAxis, ServoEmulator};
+use super::emulator::{
+    BrakeCoil, BrakeEmulator, CounterEmulator, EncoderPair, Latched, Reply, ServoAxis, ServoEmulator,
+};
 use super::plant::{Plant, PlantError, PlantSpec};
 
 /// Sampling of the plant while the counter box does not ask for any, Hz.
@@ -147,9 +149,9 @@ impl BrakeCoil for Plant {
 
 impl EncoderPair for Plant {
     fn counts_per_rev(&self) -> (u64, u64) {
-        self.counts_per_rev().into()
+        self.counts_per_rev()
     }
     fn lines(&self) -> (u32, u32) {
-        self.lines().into()
+        self.lines()
     }
 }
