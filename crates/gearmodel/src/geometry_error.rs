@@ -92,6 +92,123 @@ pub enum GeometryError {
         closing_mm: f64,
     },
 
+    /// A pitch curve that a rack cannot roll on.
+    #[error(
+        "the pitch curve of gear {gear} is concave at theta1 = {theta1_rad:.6} rad (radius of curvature {radius_mm:.3} mm):          no rack or hob reaches it; shape or erode the gear, or take a rounder curve"
+    )]
+    Concave {
+        /// 1 = driver, 2 = driven.
+        gear: u8,
+        /// Where, rad.
+        theta1_rad: f64,
+        /// Radius of curvature there, mm, negative.
+        radius_mm: f64,
+    },
+
+    /// The rack cuts away the foot of its own flank.
+    #[error(
+        "gear {gear} is undercut at theta1 = {theta1_rad:.6} rad: radius of curvature {radius_mm:.3} mm of the pitch curve is          below the limit {limit_mm:.3} mm = addendum/sin^2(pressure angle); take more teeth, a rounder curve, a larger          pressure angle or a smaller addendum"
+    )]
+    Undercut {
+        /// 1 = driver, 2 = driven.
+        gear: u8,
+        /// Where, rad.
+        theta1_rad: f64,
+        /// Radius of curvature of the pitch curve, mm.
+        radius_mm: f64,
+        /// Smallest radius without undercut, mm.
+        limit_mm: f64,
+    },
+
+    /// A tooth whose flanks meet before its tip.
+    #[error(
+        "a tooth of gear {gear} cut at theta1 = {theta1_rad:.6} rad is {thickness_mm:.3} mm thick at its tip, below the limit          {limit_mm:.3} mm; take a smaller addendum or pressure angle, or less backlash"
+    )]
+    Pointed {
+        /// 1 = driver, 2 = driven.
+        gear: u8,
+        /// Where, rad.
+        theta1_rad: f64,
+        /// Thickness at the tip, mm.
+        thickness_mm: f64,
+        /// Smallest thickness accepted, mm.
+        limit_mm: f64,
+    },
+
+    /// The tooth spaces reach the shaft.
+    #[error(
+        "the tooth spaces of gear {gear} reach its axis at theta1 = {theta1_rad:.6} rad: pitch radius {radius_mm:.3} mm,          dedendum {dedendum_mm:.3} mm; take more teeth or a rounder curve"
+    )]
+    NoRoot {
+        /// 1 = driver, 2 = driven.
+        gear: u8,
+        /// Where, rad.
+        theta1_rad: f64,
+        /// Pitch radius there, mm.
+        radius_mm: f64,
+        /// Dedendum, mm.
+        dedendum_mm: f64,
+    },
+
+    /// A pitch curve whose radius or ratio is not positive.
+    #[error(
+        "{quantity} of the pitch curve is {value:.6} at theta1 = {theta1_rad:.6} rad: it must stay positive; take smaller amplitudes"
+    )]
+    NotPositive {
+        /// Radius or ratio, relative to its mean.
+        quantity: &'static str,
+        /// Smallest value.
+        value: f64,
+        /// Where it occurs, rad.
+        theta1_rad: f64,
+    },
+
+    /// A curve whose mate does not repeat after its own turn.
+    #[error(
+        "harmonic {order} does not fit {teeth1} : {teeth2} teeth: the mate closes only if every harmonic is a multiple of          {needed}; take equal teeth, or harmonics that repeat {needed} times a turn"
+    )]
+    Harmonic {
+        /// Order of θ1 that does not fit.
+        order: u32,
+        /// Teeth of gear 1.
+        teeth1: u32,
+        /// Teeth of gear 2.
+        teeth2: u32,
+        /// Repetitions a turn that closure needs.
+        needed: u32,
+    },
+
+    /// No centre distance closes.
+    #[error(
+        "no centre distance makes this pitch curve turn its mate {closure_needed:.6} times a turn: its largest radius is too sharp a peak"
+    )]
+    NoClosingDistance {
+        /// Turns of the driven gear a turn of the driver that the tooth numbers ask for.
+        closure_needed: f64,
+    },
+
+    /// Samples that do not describe a curve.
+    #[error("sample {index} of the pitch curve: {problem}")]
+    Sample {
+        /// Index from 0.
+        index: usize,
+        /// What is wrong, and what is needed.
+        problem: &'static str,
+    },
+
+    /// A list of the wrong length.
+    #[error("{quantity} has {given} values: {lower} to {upper} are needed")]
+    Length {
+        /// The list.
+        quantity: &'static str,
+        /// Values given.
+        given: usize,
+        /// Fewest accepted.
+        lower: usize,
+        /// Most accepted.
+        upper: usize,
+    },
+
     /// A table by tooth of the wrong length.
     #[error("a table of pitch errors for gear {gear} has {given} values: {teeth} (one a tooth) or none are needed")]
     ToothTable {

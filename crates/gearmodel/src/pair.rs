@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::geometry_error::{GeometryError, check_range, check_teeth};
 use crate::pitch_curve::{AnyCurve, Circle, Ellipse, PitchCurve};
-use crate::spec::{CircularSpec, EllipticalSpec};
+use crate::spec::{CircularSpec, EllipticalSpec, ToothSpec};
 
 /// How far a drawing may round the centre distance, mm: 145.0 for 144.9997 is rounding, 150 is another pair.
 pub const CENTRE_DISTANCE_ROUNDING_MM: f64 = 0.005;
@@ -55,19 +55,8 @@ pub struct RollPoint {
     pub arc_mm: f64,
 }
 
-/// The tooth data that all kinds of pairs share, as a drawing gives them.
-struct ToothData {
-    module_mm: f64,
-    teeth: (u32, u32),
-    pressure_angle_deg: f64,
-    backlash_mm: f64,
-    face_width_mm: f64,
-    addendum: f64,
-    dedendum_clearance: f64,
-}
-
-impl ToothData {
-    fn check(&self) -> Result<(), GeometryError> {
+impl ToothSpec {
+    pub(crate) fn check(&self) -> Result<(), GeometryError> {
         check_range("module_mm", self.module_mm, "mm", (1e-3, 1e3), "give the module of the rack")?;
         check_teeth(1, self.teeth.0)?;
         check_teeth(2, self.teeth.1)?;
@@ -92,7 +81,7 @@ impl ToothData {
         Ok(())
     }
 
-    fn into_pair(self, curve: AnyCurve, centre_distance_mm: f64) -> Result<GearPair, GeometryError> {
+    pub(crate) fn pair(&self, curve: AnyCurve, centre_distance_mm: f64) -> Result<GearPair, GeometryError> {
         let (mu_rad, theta1_rad) = curve.max_inclination();
         let effective_deg = mu_rad.to_degrees() + self.pressure_angle_deg;
         if effective_deg > MAX_EFFECTIVE_PRESSURE_ANGLE_DEG {
@@ -119,15 +108,7 @@ impl GearPair {
     /// # Errors
     /// [`GeometryError`] for a number outside its range, unequal tooth numbers, or a centre distance that does not close.
     pub fn elliptical(spec: &EllipticalSpec) -> Result<Self, GeometryError> {
-        let data = ToothData {
-            module_mm: spec.module_mm,
-            teeth: spec.teeth,
-            pressure_angle_deg: spec.pressure_angle_deg,
-            backlash_mm: spec.backlash_mm,
-            face_width_mm: spec.face_width_mm,
-            addendum: spec.addendum,
-            dedendum_clearance: spec.dedendum_clearance,
-        };
+        let data = spec.teeth_and_sizes();
         data.check()?;
         check_range(
             "eccentricity",
@@ -149,7 +130,7 @@ impl GearPair {
                 ellipse.closure_at(distance)
             })?;
         }
-        data.into_pair(ellipse.into(), closing_mm)
+        data.pair(ellipse.into(), closing_mm)
     }
 
     /// Circular gears.
@@ -157,15 +138,7 @@ impl GearPair {
     /// # Errors
     /// [`GeometryError`] for a number outside its range or a centre distance other than m (Z1 + Z2)/2.
     pub fn circular(spec: &CircularSpec) -> Result<Self, GeometryError> {
-        let data = ToothData {
-            module_mm: spec.module_mm,
-            teeth: spec.teeth,
-            pressure_angle_deg: spec.pressure_angle_deg,
-            backlash_mm: spec.backlash_mm,
-            face_width_mm: spec.face_width_mm,
-            addendum: spec.addendum,
-            dedendum_clearance: spec.dedendum_clearance,
-        };
+        let data = spec.teeth_and_sizes();
         data.check()?;
         let (z1, z2) = (f64::from(spec.teeth.0), f64::from(spec.teeth.1));
         let closing_mm = 0.5 * spec.module_mm * (z1 + z2);
@@ -176,7 +149,7 @@ impl GearPair {
                 (distance > radius).then(|| radius / (distance - radius))
             })?;
         }
-        data.into_pair(circle.into(), closing_mm)
+        data.pair(circle.into(), closing_mm)
     }
 
     /// Any drive of constant ratio with two encoders: θ2 = θ1 / `ratio`, so that [`GearPair::ratio`] is 1/`ratio`.
@@ -398,7 +371,7 @@ impl GearPair {
 
 /// Passes a centre distance that a drawing may have rounded; `limit` is the largest radius (in closing distances) and
 /// where it is, `closure_at` the closure sum at a distance in closing distances.
-fn check_centre_distance(
+pub(crate) fn check_centre_distance(
     given_mm: f64,
     closing_mm: f64,
     closure_needed: f64,

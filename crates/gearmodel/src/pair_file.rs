@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Deserialize;
 
-use crate::{CircularSpec, EllipticalSpec, Errors, GearPair, GeometryError, NominalModel};
+use crate::{CircularSpec, CurveSpec, EllipticalSpec, Errors, GearPair, GeometryError, NominalModel, ToothSpec};
 
 /// A pair as its file states it, by kind.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +14,13 @@ pub enum PairSpec {
     Elliptical(EllipticalSpec),
     /// `kind = "circular"`.
     Circular(CircularSpec),
+    /// `kind = "lobed"`, `"fourier"`, `"sampled"` or `"transmission"`.
+    Free {
+        /// Teeth and sizes.
+        teeth: ToothSpec,
+        /// The driver's pitch curve.
+        curve: CurveSpec,
+    },
     /// `kind = "constant"`.
     Constant {
         /// θ2 = θ1 / ratio.
@@ -22,6 +29,16 @@ pub enum PairSpec {
 }
 
 impl PairSpec {
+    /// Kind as in the file, and the teeth where the kind has them.
+    fn teeth(&self) -> (&'static str, Option<ToothSpec>) {
+        match self {
+            Self::Elliptical(spec) => ("elliptical", Some(spec.teeth_and_sizes())),
+            Self::Circular(spec) => ("circular", Some(spec.teeth_and_sizes())),
+            Self::Free { teeth, curve } => (curve.kind(), Some(teeth.clone())),
+            Self::Constant { .. } => ("constant", None),
+        }
+    }
+
     /// The pair, checked.
     ///
     /// # Errors
@@ -30,6 +47,7 @@ impl PairSpec {
         match self {
             Self::Elliptical(spec) => GearPair::elliptical(spec),
             Self::Circular(spec) => GearPair::circular(spec),
+            Self::Free { teeth, curve } => GearPair::free(teeth, curve),
             Self::Constant { ratio } => GearPair::constant(*ratio),
         }
     }
@@ -106,6 +124,11 @@ struct RawFile {
     backlash_mm: Option<f64>,
     centre_distance_mm: Option<f64>,
     ratio: Option<f64>,
+    lobes: Option<[u32; 2]>,
+    cosines: Option<Vec<f64>>,
+    sines: Option<Vec<f64>>,
+    theta1_rad: Option<Vec<f64>>,
+    radius: Option<Vec<f64>>,
     #[serde(default)]
     documented: Errors,
 }
@@ -121,9 +144,16 @@ const TOOTH_KEYS: [&str; 8] = [
     "centre_distance_mm",
 ];
 
-/// Kinds of pairs and the keys that each has beside `kind` and `documented`.
-const KINDS: [(&str, bool, &[&str]); 3] =
-    [("elliptical", true, &["eccentricity"]), ("circular", true, &[]), ("constant", false, &["ratio"])];
+/// Kinds of pairs, whether they have teeth, and the keys that each has beside those of the teeth.
+const KINDS: [(&str, bool, &[&str]); 7] = [
+    ("elliptical", true, &["eccentricity"]),
+    ("circular", true, &[]),
+    ("lobed", true, &["eccentricity", "lobes"]),
+    ("fourier", true, &["cosines", "sines"]),
+    ("sampled", true, &["theta1_rad", "radius"]),
+    ("transmission", true, &["cosines", "sines"]),
+    ("constant", false, &["ratio"]),
+];
 
 impl PairFile {
     /// Reads the text of a `pair.toml`.
@@ -144,38 +174,10 @@ impl PairFile {
             });
         };
         raw.refuse_keys_of_other_kinds(text, kind, has_teeth, own_keys)?;
-        let need = |key: &'static str, value: Option<f64>| value.ok_or(PairFileError::MissingKey { key, kind });
-        let gears = match kind {
-            "constant" => PairSpec::Constant { ratio: need("ratio", raw.ratio)? },
-            _ => {
-                let module_mm = need("module_mm", raw.module_mm)?;
-                let [teeth1, teeth2] = raw.teeth.ok_or(PairFileError::MissingKey { key: "teeth", kind })?;
-                let common = CircularSpec {
-                    module_mm,
-                    teeth: (teeth1, teeth2),
-                    pressure_angle_deg: raw.pressure_angle_deg.unwrap_or(20.0),
-                    centre_distance_mm: raw.centre_distance_mm,
-                    backlash_mm: raw.backlash_mm.unwrap_or(0.0),
-                    face_width_mm: raw.face_width_mm.unwrap_or(30.0),
-                    addendum: raw.addendum.unwrap_or(1.0),
-                    dedendum_clearance: raw.dedendum_clearance.unwrap_or(0.25),
-                };
-                if kind == "circular" {
-                    PairSpec::Circular(common)
-                } else {
-                    PairSpec::Elliptical(EllipticalSpec {
-                        module_mm,
-                        teeth: common.teeth,
-                        eccentricity: need("eccentricity", raw.eccentricity)?,
-                        pressure_angle_deg: common.pressure_angle_deg,
-                        centre_distance_mm: common.centre_distance_mm,
-                        backlash_mm: common.backlash_mm,
-                        face_width_mm: common.face_width_mm,
-                        addendum: common.addendum,
-                        dedendum_clearance: common.dedendum_clearance,
-                    })
-                }
-            }
+        let gears = if has_teeth {
+            raw.with_teeth(kind)?
+        } else {
+            PairSpec::Constant { ratio: need(kind, "ratio", raw.ratio)? }
         };
         Ok(Self { gears, documented: raw.documented })
     }
@@ -196,37 +198,37 @@ impl PairFile {
             // Writing to a String cannot fail.
             let _ = writeln!(text, "{key} = {value:?}");
         };
+        let (kind, teeth) = self.gears.teeth();
+        line("kind", &kind);
         match &self.gears {
-            PairSpec::Constant { ratio } => {
-                line("kind", &"constant");
-                line("ratio", ratio);
-            }
-            PairSpec::Elliptical(spec) => {
-                line("kind", &"elliptical");
-                line("module_mm", &spec.module_mm);
-                line("teeth", &[spec.teeth.0, spec.teeth.1]);
-                line("eccentricity", &spec.eccentricity);
-                line("pressure_angle_deg", &spec.pressure_angle_deg);
-                line("face_width_mm", &spec.face_width_mm);
-                line("addendum", &spec.addendum);
-                line("dedendum_clearance", &spec.dedendum_clearance);
-                line("backlash_mm", &spec.backlash_mm);
-                if let Some(centre_distance_mm) = spec.centre_distance_mm {
-                    line("centre_distance_mm", &centre_distance_mm);
+            PairSpec::Constant { ratio } => line("ratio", ratio),
+            PairSpec::Elliptical(spec) => line("eccentricity", &spec.eccentricity),
+            PairSpec::Circular(_) => {}
+            PairSpec::Free { curve, .. } => match curve {
+                CurveSpec::Lobed { eccentricity, lobes } => {
+                    line("eccentricity", eccentricity);
+                    line("lobes", &[lobes.0, lobes.1]);
                 }
-            }
-            PairSpec::Circular(spec) => {
-                line("kind", &"circular");
-                line("module_mm", &spec.module_mm);
-                line("teeth", &[spec.teeth.0, spec.teeth.1]);
-                line("pressure_angle_deg", &spec.pressure_angle_deg);
-                line("face_width_mm", &spec.face_width_mm);
-                line("addendum", &spec.addendum);
-                line("dedendum_clearance", &spec.dedendum_clearance);
-                line("backlash_mm", &spec.backlash_mm);
-                if let Some(centre_distance_mm) = spec.centre_distance_mm {
-                    line("centre_distance_mm", &centre_distance_mm);
+                CurveSpec::Fourier { cosines, sines } | CurveSpec::Transmission { cosines, sines } => {
+                    line("cosines", cosines);
+                    line("sines", sines);
                 }
+                CurveSpec::Sampled { theta1_rad, radius } => {
+                    line("theta1_rad", theta1_rad);
+                    line("radius", radius);
+                }
+            },
+        }
+        if let Some(teeth) = teeth {
+            line("module_mm", &teeth.module_mm);
+            line("teeth", &[teeth.teeth.0, teeth.teeth.1]);
+            line("pressure_angle_deg", &teeth.pressure_angle_deg);
+            line("face_width_mm", &teeth.face_width_mm);
+            line("addendum", &teeth.addendum);
+            line("dedendum_clearance", &teeth.dedendum_clearance);
+            line("backlash_mm", &teeth.backlash_mm);
+            if let Some(centre_distance_mm) = teeth.centre_distance_mm {
+                line("centre_distance_mm", &centre_distance_mm);
             }
         }
         let errors = &self.documented;
@@ -241,7 +243,59 @@ impl PairFile {
     }
 }
 
+/// A key that must be there.
+fn need<T>(kind: &'static str, key: &'static str, value: Option<T>) -> Result<T, PairFileError> {
+    value.ok_or(PairFileError::MissingKey { key, kind })
+}
+
 impl RawFile {
+    /// The gears of a kind that has teeth.
+    fn with_teeth(&self, kind: &'static str) -> Result<PairSpec, PairFileError> {
+        let [teeth1, teeth2] = need(kind, "teeth", self.teeth)?;
+        let teeth = ToothSpec {
+            module_mm: need(kind, "module_mm", self.module_mm)?,
+            teeth: (teeth1, teeth2),
+            pressure_angle_deg: self.pressure_angle_deg.unwrap_or(20.0),
+            centre_distance_mm: self.centre_distance_mm,
+            backlash_mm: self.backlash_mm.unwrap_or(0.0),
+            face_width_mm: self.face_width_mm.unwrap_or(30.0),
+            addendum: self.addendum.unwrap_or(1.0),
+            dedendum_clearance: self.dedendum_clearance.unwrap_or(0.25),
+        };
+        let waves = || {
+            // One of the two lists may be left out, but not both: that would be a circle by oversight.
+            if self.cosines.is_none() && self.sines.is_none() {
+                return Err(PairFileError::MissingKey { key: "cosines", kind });
+            }
+            Ok((self.cosines.clone().unwrap_or_default(), self.sines.clone().unwrap_or_default()))
+        };
+        let curve = match kind {
+            "circular" => return Ok(PairSpec::Circular(teeth.into())),
+            "lobed" => {
+                let [lobes1, lobes2] = need(kind, "lobes", self.lobes)?;
+                let eccentricity = need(kind, "eccentricity", self.eccentricity)?;
+                CurveSpec::Lobed { eccentricity, lobes: (lobes1, lobes2) }
+            }
+            "fourier" => {
+                let (cosines, sines) = waves()?;
+                CurveSpec::Fourier { cosines, sines }
+            }
+            "transmission" => {
+                let (cosines, sines) = waves()?;
+                CurveSpec::Transmission { cosines, sines }
+            }
+            "sampled" => CurveSpec::Sampled {
+                theta1_rad: need(kind, "theta1_rad", self.theta1_rad.clone())?,
+                radius: need(kind, "radius", self.radius.clone())?,
+            },
+            _ => {
+                let eccentricity = need(kind, "eccentricity", self.eccentricity)?;
+                return Ok(PairSpec::Elliptical(teeth.with_eccentricity(eccentricity)));
+            }
+        };
+        Ok(PairSpec::Free { teeth, curve })
+    }
+
     fn refuse_keys_of_other_kinds(
         &self,
         text: &str,
@@ -261,6 +315,11 @@ impl RawFile {
             ("backlash_mm", self.backlash_mm.is_some()),
             ("centre_distance_mm", self.centre_distance_mm.is_some()),
             ("ratio", self.ratio.is_some()),
+            ("lobes", self.lobes.is_some()),
+            ("cosines", self.cosines.is_some()),
+            ("sines", self.sines.is_some()),
+            ("theta1_rad", self.theta1_rad.is_some()),
+            ("radius", self.radius.is_some()),
         ];
         for (key, present) in given {
             if present && !own_keys.contains(&key) && !tooth_keys.contains(&key) {

@@ -80,3 +80,153 @@ impl Default for CircularSpec {
         }
     }
 }
+
+/// Teeth and sizes of a pair, whatever its pitch curve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ToothSpec {
+    /// Module m, mm.
+    pub module_mm: f64,
+    /// Teeth of the driver and of the driven gear; their ratio is the closure.
+    pub teeth: (u32, u32),
+    /// Pressure angle α of the rack, deg.
+    pub pressure_angle_deg: f64,
+    /// Centre distance of the drawing, mm; checked against closure, `None` = the one that closes.
+    pub centre_distance_mm: Option<f64>,
+    /// Designed backlash of both gears together along the pitch curve, mm.
+    pub backlash_mm: f64,
+    /// Face width, mm.
+    pub face_width_mm: f64,
+    /// Addendum in modules.
+    pub addendum: f64,
+    /// Clearance of the dedendum over the mate's addendum, in modules.
+    pub dedendum_clearance: f64,
+}
+
+impl Default for ToothSpec {
+    /// m = 3 mm, 47 teeth on both gears, α = 20°, no backlash.
+    fn default() -> Self {
+        Self {
+            module_mm: 3.0,
+            teeth: (47, 47),
+            pressure_angle_deg: 20.0,
+            centre_distance_mm: None,
+            backlash_mm: 0.0,
+            face_width_mm: 30.0,
+            addendum: 1.0,
+            dedendum_clearance: 0.25,
+        }
+    }
+}
+
+/// A free pitch curve of the driver; the tooth condition scales it, closure fixes its mate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum CurveSpec {
+    /// Ellipses of higher order, r1 = p/(1 − k cos n1 θ1), n1 lobes driving n2; the teeth stand in the same ratio.
+    Lobed {
+        /// Eccentricity k, 0 to below 1.
+        eccentricity: f64,
+        /// Lobes (n1, n2).
+        lobes: (u32, u32),
+    },
+    /// r1 ∝ 1 + Σ cosines\[n−1\] cos n θ1 + sines\[n−1\] sin n θ1.
+    Fourier {
+        /// Cosine amplitudes from order 1.
+        cosines: Vec<f64>,
+        /// Sine amplitudes from order 1.
+        sines: Vec<f64>,
+    },
+    /// r1 through samples, in any unit, by a periodic cubic spline.
+    Sampled {
+        /// Angles, rad, strictly increasing within one turn.
+        theta1_rad: Vec<f64>,
+        /// Radii at these angles, any unit.
+        radius: Vec<f64>,
+    },
+    /// A given transmission: i21 ∝ 1 + Σ cosines\[n−1\] cos n θ1 + sines\[n−1\] sin n θ1, scaled to the closure of the teeth.
+    Transmission {
+        /// Cosine amplitudes from order 1.
+        cosines: Vec<f64>,
+        /// Sine amplitudes from order 1.
+        sines: Vec<f64>,
+    },
+}
+
+impl ToothSpec {
+    /// The elliptical pair of these teeth.
+    #[must_use]
+    pub fn with_eccentricity(&self, eccentricity: f64) -> EllipticalSpec {
+        EllipticalSpec {
+            module_mm: self.module_mm,
+            teeth: self.teeth,
+            eccentricity,
+            pressure_angle_deg: self.pressure_angle_deg,
+            centre_distance_mm: self.centre_distance_mm,
+            backlash_mm: self.backlash_mm,
+            face_width_mm: self.face_width_mm,
+            addendum: self.addendum,
+            dedendum_clearance: self.dedendum_clearance,
+        }
+    }
+}
+
+impl From<ToothSpec> for CircularSpec {
+    fn from(teeth: ToothSpec) -> Self {
+        Self {
+            module_mm: teeth.module_mm,
+            teeth: teeth.teeth,
+            pressure_angle_deg: teeth.pressure_angle_deg,
+            centre_distance_mm: teeth.centre_distance_mm,
+            backlash_mm: teeth.backlash_mm,
+            face_width_mm: teeth.face_width_mm,
+            addendum: teeth.addendum,
+            dedendum_clearance: teeth.dedendum_clearance,
+        }
+    }
+}
+
+impl CircularSpec {
+    /// Teeth and sizes, whatever the pitch curve.
+    #[must_use]
+    pub fn teeth_and_sizes(&self) -> ToothSpec {
+        ToothSpec {
+            module_mm: self.module_mm,
+            teeth: self.teeth,
+            pressure_angle_deg: self.pressure_angle_deg,
+            centre_distance_mm: self.centre_distance_mm,
+            backlash_mm: self.backlash_mm,
+            face_width_mm: self.face_width_mm,
+            addendum: self.addendum,
+            dedendum_clearance: self.dedendum_clearance,
+        }
+    }
+}
+
+impl EllipticalSpec {
+    /// Teeth and sizes, whatever the pitch curve.
+    #[must_use]
+    pub fn teeth_and_sizes(&self) -> ToothSpec {
+        ToothSpec {
+            module_mm: self.module_mm,
+            teeth: self.teeth,
+            pressure_angle_deg: self.pressure_angle_deg,
+            centre_distance_mm: self.centre_distance_mm,
+            backlash_mm: self.backlash_mm,
+            face_width_mm: self.face_width_mm,
+            addendum: self.addendum,
+            dedendum_clearance: self.dedendum_clearance,
+        }
+    }
+}
+
+impl CurveSpec {
+    /// Name as in `kind` of `pair.toml`.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Lobed { .. } => "lobed",
+            Self::Fourier { .. } => "fourier",
+            Self::Sampled { .. } => "sampled",
+            Self::Transmission { .. } => "transmission",
+        }
+    }
+}

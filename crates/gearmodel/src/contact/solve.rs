@@ -58,15 +58,14 @@ pub(super) struct Touch {
     bend: Bend,
 }
 
-/// Radii of curvature of the two flanks at a contact, and the rate at which the contact runs along gear 1's flank.
+/// Supports of the two flanks of tooth 0 at a contact, (gear 1, gear 2), as their curvature needs them.
 #[derive(Clone, Copy, Debug)]
 struct Bend {
-    /// Radius of curvature h + h'' of gear 1's flank of tooth 0, mm.
-    driver_mm: f64,
-    /// h + h'' of gear 2's flank of tooth space 0, mm.
-    driven_mm: f64,
-    /// d(flank length)/d(arc length rolled) over the radius of curvature, 1/mm.
-    turn_per_arc: f64,
+    h_mm: (f64, f64),
+    chi_slope: (f64, f64),
+    t_slope_mm: (f64, f64),
+    /// ds/dθ at gear 1's contact point, mm/rad.
+    arc_per_rad: f64,
 }
 
 impl Touch {
@@ -79,12 +78,14 @@ impl Touch {
     /// on gear 1's flank, 1/mm; `shift_mm` is the tooth's own offset along the rack, j·π m.
     pub(super) fn opening_per_mm(&self, shift_mm: f64, cos_alpha: f64) -> f64 {
         let shift = self.direction.sign() * shift_mm * cos_alpha;
-        let driver_mm = self.bend.driver_mm - shift;
-        // Gear 2's flank has the opposite outward normal.
-        let driven_mm = -(self.bend.driven_mm - shift);
-        // Flank length for Δs is ρ1·turn·Δs; the gap is (1/ρ1 + 1/ρ2)/2 times its square.
-        let length = driver_mm * self.bend.turn_per_arc;
-        0.5 * length * length * (1.0 / driver_mm + 1.0 / driven_mm)
+        let bend = &self.bend;
+        // Flank length is (h + h'') dχ = (h χ' + t') dθ; the gap is (1/ρ1 + 1/ρ2)/2 times its square. Gear 2's flank has the
+        // opposite outward normal. Written without ρ, which is infinite where a pitch curve has an inflection.
+        let length_a = (bend.h_mm.0 - shift) * bend.chi_slope.0 + bend.t_slope_mm.0;
+        let length_b = (bend.h_mm.1 - shift) * bend.chi_slope.1 + bend.t_slope_mm.1;
+        let curvature = bend.chi_slope.0 / length_a - bend.chi_slope.1 / length_b;
+        let length = length_a / bend.arc_per_rad;
+        0.5 * length * length * curvature
     }
 }
 
@@ -213,9 +214,10 @@ pub(super) fn touch(
                 theta_rad: (theta_a, theta_b),
                 theta_per_lead: (-sign * slip_b / determinant, sign * slip_a / determinant),
                 bend: Bend {
-                    driver_mm: a.h_mm + a.t_slope_mm / a.chi_slope,
-                    driven_mm: b.h_mm + b.t_slope_mm / b.chi_slope,
-                    turn_per_arc: a.chi_slope / arc_per_rad,
+                    h_mm: (a.h_mm, b.h_mm),
+                    chi_slope: (a.chi_slope, b.chi_slope),
+                    t_slope_mm: (a.t_slope_mm, b.t_slope_mm),
+                    arc_per_rad,
                 },
             });
         }

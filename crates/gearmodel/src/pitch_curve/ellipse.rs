@@ -27,7 +27,7 @@ pub struct Ellipse {
 /// θ + 2 atan(c sin θ/(1 − c cos θ)): the unwrapped Moebius map tan(y/2) = ((1 + c)/(1 − c)) tan(θ/2), |c| < 1.
 /// The inverse has −c. 1 − c cos θ > 0, so the arctangent never leaves its branch and the map is smooth on all reals.
 #[inline]
-fn moebius(c: f64, theta_rad: f64) -> f64 {
+pub(super) fn moebius(c: f64, theta_rad: f64) -> f64 {
     let (sin, cos) = theta_rad.sin_cos();
     theta_rad + 2.0 * (c * sin / (1.0 - c * cos)).atan()
 }

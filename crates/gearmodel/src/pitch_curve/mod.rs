@@ -7,10 +7,17 @@
 
 mod circle;
 mod ellipse;
+mod lobed;
+mod numeric;
+mod panels;
+pub(crate) mod shape;
 
 pub use circle::Circle;
 pub use ellipse::Ellipse;
 pub(crate) use ellipse::MAX_ECCENTRICITY;
+pub use lobed::Lobed;
+pub use numeric::Numeric;
+pub(crate) use numeric::highest;
 
 /// Angle and ratio of the driven gear at one angle of the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -138,4 +145,8 @@ pitch_curves! {
     Circle,
     /// Ellipse about a focus, driving its twin.
     Ellipse,
+    /// Ellipse of higher order, driving its mate.
+    Lobed,
+    /// A free curve: Fourier series, samples, or a given transmission.
+    Numeric,
 }

@@ -1,0 +1,138 @@
+//! Ellipses of higher order: n1 lobes driving n2.
+//!
+//! r1 = p/(1 − k cos n1 θ1). The mate's centre distance follows from closure: with C = n1/n2 the integral
+//! (1/2π) ∮ r1/(a − r1) dθ1 = p/√((a − p)² − a²k²) = C gives a quadratic in a/p,
+//!
+//! a/p = [1 + √(1 − (1 − k²)(1 − 1/C²))]/(1 − k²),
+//!
+//! and the transmission is again a Moebius map, θ2 = (1/n2)·M(n1 θ1). n1 = n2 = 1 is the ellipse about a focus.
+
+use super::ellipse::moebius;
+use super::panels::PanelSeries;
+use super::{Motion, PitchCurve};
+
+/// An ellipse of order n1 driving its mate of order n2.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lobed {
+    n1: f64,
+    n2: f64,
+    /// Parameter of the Moebius map: i21 = C (1 − q²)/(1 − 2q cos n1θ1 + q²).
+    q: f64,
+    k: f64,
+    /// p in centre distances.
+    p: f64,
+    speed: PanelSeries,
+}
+
+impl Lobed {
+    /// Eccentricity k in 0..=0.99 and lobes ≥ 1 (checked by the caller).
+    pub(crate) fn new(k: f64, (lobes1, lobes2): (u32, u32)) -> Self {
+        let (n1, n2) = (f64::from(lobes1), f64::from(lobes2));
+        let inverse_closure = n2 / n1;
+        let one_less = 1.0 - k * k;
+        let distance = (1.0 + (1.0 - one_less * (1.0 - inverse_closure * inverse_closure)).sqrt()) / one_less;
+        // i = p/((a − p) − a k cos φ) ∝ 1/(1 − b cos φ), b = a k/(a − p); 1 − 2q cos φ + q² ∝ 1 − b cos φ for
+        // b = 2q/(1 + q²)
+        let b = distance * k / (distance - 1.0);
+        let q = b / (1.0 + (1.0 - b * b).sqrt());
+        let p = 1.0 / distance;
+        let speed = PanelSeries::fit(&[], |theta| {
+            let (sin, cos) = (n1 * theta).sin_cos();
+            let rest = 1.0 - k * cos;
+            let tan_mu = -n1 * k * sin / rest;
+            p / rest * (1.0 + tan_mu * tan_mu).sqrt()
+        });
+        Self { n1, n2, q, k, p, speed }
+    }
+}
+
+impl PitchCurve for Lobed {
+    fn kind(&self) -> &'static str {
+        "lobed"
+    }
+
+    fn closure(&self) -> f64 {
+        self.n1 / self.n2
+    }
+
+    #[inline]
+    fn theta2(&self, theta1_rad: f64) -> f64 {
+        moebius(self.q, self.n1 * theta1_rad) / self.n2
+    }
+
+    fn theta2_inverse(&self, theta2_rad: f64) -> f64 {
+        moebius(-self.q, self.n2 * theta2_rad) / self.n1
+    }
+
+    #[inline]
+    fn motion(&self, theta1_rad: f64) -> Motion {
+        let q = self.q;
+        let phase_rad = self.n1 * theta1_rad;
+        let (sin, cos) = phase_rad.sin_cos();
+        let denominator = 1.0 - 2.0 * q * cos + q * q;
+        let ratio = self.n1 / self.n2 * (1.0 - q * q) / denominator;
+        Motion {
+            theta2_rad: (phase_rad + 2.0 * (q * sin / (1.0 - q * cos)).atan()) / self.n2,
+            ratio,
+            ratio_slope: -2.0 * q * self.n1 * sin * ratio / denominator,
+        }
+    }
+
+    fn ratio_curvature(&self, theta1_rad: f64) -> f64 {
+        let q = self.q;
+        let (sin, cos) = (self.n1 * theta1_rad).sin_cos();
+        let denominator = 1.0 - 2.0 * q * cos + q * q;
+        let ratio = self.n1 / self.n2 * (1.0 - q * q) / denominator;
+        -2.0 * q * self.n1 * self.n1 * ratio * (cos * denominator - 4.0 * q * sin * sin) / (denominator * denominator)
+    }
+
+    fn arc(&self, theta1_rad: f64) -> f64 {
+        self.speed.integral(theta1_rad)
+    }
+
+    fn radius_range(&self) -> (f64, f64) {
+        (self.p / (1.0 + self.k), self.p / (1.0 - self.k))
+    }
+
+    fn max_inclination(&self) -> (f64, f64) {
+        // tan μ = −n k sin φ/(1 − k cos φ) is largest at cos φ = k, where it is n k/√(1 − k²)
+        ((self.n1 * self.k / (1.0 - self.k * self.k).sqrt()).atan(), self.k.acos() / self.n1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::pitch_curve::Ellipse;
+
+    #[test]
+    fn one_lobe_each_is_the_ellipse() {
+        for k in [0.0, 0.3287, 0.8] {
+            let (lobed, ellipse) = (Lobed::new(k, (1, 1)), Ellipse::new(k));
+            for step in -20..20 {
+                let theta = 0.4 * f64::from(step);
+                assert!((lobed.theta2(theta) - ellipse.theta2(theta)).abs() < 1e-13);
+                assert!((lobed.arc(theta) - ellipse.arc(theta)).abs() < 1e-13);
+                assert!((lobed.motion(theta).ratio / ellipse.motion(theta).ratio - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn radius_and_ratio_agree_for_every_order() {
+        for (lobes, k) in [((2, 3), 0.3), ((3, 1), 0.1), ((1, 2), 0.5), ((5, 4), 0.03)] {
+            let curve = Lobed::new(k, lobes);
+            for step in 0..50 {
+                let theta = 0.13 * f64::from(step);
+                let i = curve.motion(theta).ratio;
+                let r = curve.p / (1.0 - k * (f64::from(lobes.0) * theta).cos());
+                assert!((i / (1.0 + i) - r).abs() < 1e-13, "{lobes:?}");
+                assert!((curve.theta2_inverse(curve.theta2(theta)) - theta).abs() < 1e-12);
+            }
+            let turn = curve.theta2(TAU) - curve.theta2(0.0);
+            assert!((turn - TAU * f64::from(lobes.0) / f64::from(lobes.1)).abs() < 1e-12);
+        }
+    }
+}
