@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
 use pyo3::{PyErr, create_exception};
 
 create_exception!(
@@ -76,6 +76,27 @@ impl From<InputError> for Raised {
     }
 }
 
+impl From<riglog::LogError> for Raised {
+    fn from(error: riglog::LogError) -> Self {
+        Self(match &error {
+            riglog::LogError::Io { source, .. } => os_error(source, error.to_string()),
+            _ => LogError::new_err(error.to_string()),
+        })
+    }
+}
+
+impl From<gearmodel::measure::MeasureError> for Raised {
+    fn from(error: gearmodel::measure::MeasureError) -> Self {
+        Self(PyValueError::new_err(error.to_string()))
+    }
+}
+
+impl From<crate::recording::check::RecordingError> for Raised {
+    fn from(error: crate::recording::check::RecordingError) -> Self {
+        Self(PyValueError::new_err(error.to_string()))
+    }
+}
+
 /// An argument that the model never sees.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
@@ -115,6 +136,29 @@ pub enum InputError {
         /// The text given.
         given: String,
     },
+    /// Backlash needs one recording of each sense.
+    #[error(
+        "{argument} was recorded {found}: backlash_from(ccw, cw, pair) needs the ccw recording first, then the cw one"
+    )]
+    Sense {
+        /// The argument.
+        argument: &'static str,
+        /// Its direction.
+        found: gearmodel::Direction,
+    },
+    /// Recordings that share no angle.
+    #[error("the two recordings share no bin of theta1: record overlapping angles in both senses, or take fewer bins")]
+    NoCommonAngle,
+    /// An order beyond what the grid resolves.
+    #[error("highest_order = {given} is outside 1 to {limit}: {bins} bins a turn resolve no more; take more bins")]
+    HighestOrder {
+        /// The order given.
+        given: u32,
+        /// The highest possible.
+        limit: usize,
+        /// Bins a turn.
+        bins: usize,
+    },
     /// The printed equations know no load.
     #[error(
         "load_nm = {load_nm} N.m with method \"published\": the printed equations know no load; take \"common_normal\" \
@@ -133,8 +177,14 @@ pub enum InputError {
 }
 
 /// The OSError of a failure to read or write a file, with the file's name in it.
-pub fn file_error(path: &Path, error: std::io::Error) -> PyErr {
-    let kind = error.kind();
-    let text = format!("{}: {error}", path.display());
-    PyErr::from(std::io::Error::new(kind, text))
+pub fn file_error(path: &Path, error: &std::io::Error) -> PyErr {
+    os_error(error, format!("{}: {error}", path.display()))
+}
+
+/// OSError, as the subclass that its number stands for (FileNotFoundError, PermissionError...).
+fn os_error(source: &std::io::Error, text: String) -> PyErr {
+    match source.raw_os_error() {
+        Some(number) => PyOSError::new_err((number, text)),
+        None => PyErr::from(std::io::Error::new(source.kind(), text)),
+    }
 }

@@ -25,7 +25,7 @@ use crate::error::Result;
 /// >>> gm.Errors(e1_mm=0.05, phi1_rad=0.3)
 /// Errors(e1_mm=0.05, phi1_rad=0.3)
 #[pyclass(frozen, eq, from_py_object, module = "gearmodel", name = "Errors")]
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Errors(pub gearmodel::Errors);
 
 /// Field name and value, in the order of the constructor.

@@ -11,6 +11,32 @@ TE_cw - TE_ccw at equal theta1.
 1108.4 urad
 """
 
-from ._native import Errors, GearPair, GeometryError, LogError
+from ._native import (
+    Analysis,
+    Errors,
+    Event,
+    GearPair,
+    GeometryError,
+    Log,
+    LogError,
+    MeasuredBacklash,
+    Recording,
+    analyse,
+    backlash_from,
+    read_log,
+)
 
-__all__ = ["Errors", "GearPair", "GeometryError", "LogError"]
+__all__ = [
+    "Analysis",
+    "Errors",
+    "Event",
+    "GearPair",
+    "GeometryError",
+    "Log",
+    "LogError",
+    "MeasuredBacklash",
+    "Recording",
+    "analyse",
+    "backlash_from",
+    "read_log",
+]

@@ -1,0 +1,51 @@
+"""Figures of measured and predicted curves, with matplotlib."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._extras import require
+
+if TYPE_CHECKING:
+    from . import Analysis, MeasuredBacklash
+
+URAD = 1e6
+DEGREES = "driver angle theta1 / deg"
+
+
+def _figure(rows: int) -> tuple[Any, Any]:
+    # Figure, not pyplot: no window system is started and nothing global changes.
+    figure_module = require("matplotlib.figure", extra="plot", purpose="plot()")
+    figure = figure_module.Figure(figsize=(8.0, 3.2 * rows), layout="constrained")
+    return figure, figure.subplots(rows, 1)
+
+
+def analysis(a: Analysis) -> Any:
+    """TE over theta1, revolution by revolution, mean and prediction; below, the orders."""
+    figure, (curve, orders) = _figure(2)
+    degrees = np.degrees(a.theta1)
+    for revolution in a.te:
+        curve.plot(degrees, URAD * revolution, color="0.8", linewidth=0.8)
+    curve.plot(degrees, URAD * a.mean_curve, label="measured, mean")
+    curve.plot(degrees, URAD * (a.predicted + a.zero_rad), "--", label="predicted, zero moved")
+    curve.set(xlabel=DEGREES, ylabel="TE / urad", xlim=(0, 360), title=f"{a.direction}, {a.load_nm:g} N m, {a.speed_rpm:g} rpm")
+    curve.legend()
+    orders.stem(a.spectrum.order, URAD * a.spectrum.amplitude_rad, markerfmt=" ", basefmt=" ")
+    orders.axhline(URAD * a.floor, color="0.5", linestyle=":", label="floor, rms")
+    orders.set(xlabel="periods a turn of the driver", ylabel="amplitude / urad", yscale="log")
+    orders.legend()
+    return figure
+
+
+def backlash(b: MeasuredBacklash) -> Any:
+    """Backlash over theta1 with its interval, and the prediction."""
+    figure, axes = _figure(1)
+    degrees = np.degrees(b.theta1)
+    axes.fill_between(degrees, URAD * b.low, URAD * b.high, color="0.85", label="90 % interval")
+    axes.plot(degrees, URAD * b.backlash, label="measured")
+    axes.plot(degrees, URAD * b.predicted, "--", label="predicted")
+    axes.set(xlabel=DEGREES, ylabel="backlash / urad", xlim=(0, 360))
+    axes.legend()
+    return figure

@@ -1,0 +1,68 @@
+//! Where a recording reverses: a robot joint's goes to and fro.
+
+use gearmodel::Direction;
+
+/// Way back that makes a reversal, rad: above encoder noise and velocity ripple, below any motion that is meant.
+pub const REVERSAL_RAD: f64 = 0.01;
+
+/// A stretch of one sense: samples `from..to`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretch {
+    /// First sample.
+    pub from: usize,
+    /// First sample after it.
+    pub to: usize,
+    /// The driver's sense.
+    pub direction: Direction,
+}
+
+/// Index and angle of a lowest or highest sample.
+type Extremum = Option<(usize, f64)>;
+
+/// Cuts at the turning points of `theta1_rad` (NaN = gap). Empty where it never moves by more than [`REVERSAL_RAD`].
+///
+/// A turning point is an extremum from which the angle then comes back by more than [`REVERSAL_RAD`]; the sample of the
+/// extremum begins the new stretch.
+pub fn stretches(theta1_rad: &[f64]) -> Vec<Stretch> {
+    let mut found: Vec<Stretch> = Vec::new();
+    let mut from = 0;
+    // Lowest and highest sample since the last turning point.
+    let (mut low, mut high): (Extremum, Extremum) = (None, None);
+    let mut sense: Option<Direction> = None;
+    for (index, &theta) in theta1_rad.iter().enumerate() {
+        if theta.is_nan() {
+            continue;
+        }
+        if low.is_none_or(|(_, value)| theta < value) {
+            low = Some((index, theta));
+        }
+        if high.is_none_or(|(_, value)| theta > value) {
+            high = Some((index, theta));
+        }
+        let (Some((low_at, lowest)), Some((high_at, highest))) = (low, high) else { continue };
+        let turned = match sense {
+            Some(Direction::Ccw) => (highest - theta > REVERSAL_RAD).then_some((high_at, Direction::Ccw)),
+            Some(Direction::Cw) => (theta - lowest > REVERSAL_RAD).then_some((low_at, Direction::Cw)),
+            None => {
+                // The first clear motion shows the sense; what came before it belongs to it.
+                if highest - lowest > REVERSAL_RAD {
+                    sense = Some(if high_at > low_at { Direction::Ccw } else { Direction::Cw });
+                }
+                None
+            }
+        };
+        if let Some((at, direction)) = turned {
+            found.push(Stretch { from, to: at, direction });
+            from = at;
+            sense = Some(direction.reversed());
+            (low, high) = match direction {
+                Direction::Ccw => (Some((index, theta)), Some((at, highest))),
+                Direction::Cw => (Some((at, lowest)), Some((index, theta))),
+            };
+        }
+    }
+    if let Some(direction) = sense {
+        found.push(Stretch { from, to: theta1_rad.len(), direction });
+    }
+    found
+}
