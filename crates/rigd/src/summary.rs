@@ -27,8 +27,7 @@ pub struct Summary {
     pub duration_s: f64,
     /// TE of the last load, by sense.
     pub te: BTreeMap<&'static str, TeFigures>,
-    /// Backlash of the last load; absent until both senses are measured.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Backlash of the last load; null until both senses are measured.
     pub backlash: Option<BacklashFigures>,
     /// Hash of every TE and backlash value, in order.
     pub te_hash: String,

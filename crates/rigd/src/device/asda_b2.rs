@@ -125,7 +125,7 @@ impl Servo for AsdaB2 {
         loop {
             let outputs = self.outputs().await?;
             if outputs.has(Outputs::SERVO_ON) == enabled {
-                return Ok(());
+                break;
             }
             if tokio::time::Instant::now() > patience {
                 return Err(DeviceError::NotReached {
@@ -137,6 +137,11 @@ impl Servo for AsdaB2 {
                 });
             }
         }
+        if !enabled {
+            // A motor that is off needs no watching; left armed, the watchdog would raise an alarm after every run in order.
+            self.bus.set(&WATCHDOG, 0.0).await?;
+        }
+        Ok(())
     }
 
     async fn set_motor_rpm(&mut self, rpm: f64) -> Result<(), DeviceError> {

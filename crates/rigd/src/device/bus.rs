@@ -147,6 +147,9 @@ pub enum BusError {
     },
 }
 
+/// Longest wait for a line to fall silent: shorter than any lease, so that one chattering device never costs the other's.
+const DRAIN_LIMIT: Duration = Duration::from_millis(250);
+
 /// Master of one line with one device.
 pub struct Bus {
     link: Link,
@@ -345,7 +348,8 @@ impl Bus {
         let mut buffer = [0; 256];
         let quiet = self.manners.silence.max(Duration::from_millis(20));
         // A line that never falls silent is not Modbus; the request that follows will tell.
-        for _ in 0..1000 {
+        let give_up = Instant::now() + DRAIN_LIMIT;
+        while Instant::now() < give_up {
             match tokio::time::timeout(quiet, self.link.read(&mut buffer)).await {
                 Err(_) => break,
                 Ok(outcome) => {

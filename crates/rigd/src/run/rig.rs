@@ -117,11 +117,17 @@ impl Rig {
     /// [`Halt`] when the run has to end.
     pub async fn tick(&mut self) -> Result<(), Halt> {
         self.poll.tick().await;
-        if self.stop.any() {
-            return Err(Halt::Operator);
-        }
+        self.heed_stop()?;
         self.observe().await?;
         self.supervise()
+    }
+
+    /// Before anything that moves.
+    ///
+    /// # Errors
+    /// [`Halt::Operator`] when a stop was asked for.
+    pub fn heed_stop(&self) -> Result<(), Halt> {
+        if self.stop.any() { Err(Halt::Operator) } else { Ok(()) }
     }
 
     /// Reads both drives and writes the state.
@@ -314,11 +320,14 @@ impl Rig {
         {
             troubles.push(format!("servo was not switched off: {error}; switch it off by hand"));
         }
-        if let Some(stream) = self.stream.take() {
+        if let Some(mut stream) = self.stream.take() {
             stream.end.notify_one();
             // One batch is always on its way; a task that has ended does not wait.
-            if tokio::time::timeout(Duration::from_secs(2), stream.task).await.is_err() {
+            if tokio::time::timeout(Duration::from_secs(2), &mut stream.task).await.is_err() {
                 troubles.push("counter did not acknowledge its stop".into());
+                // It must not hold the acquisition any longer, for the log is finalised next.
+                stream.task.abort();
+                let _ = stream.task.await;
             }
         }
         self.enter(Phase::Idle);

@@ -52,6 +52,7 @@ async fn prepare(rig: &mut Rig, mut counter: Box<dyn Counter>, plan: &Plan) -> R
     rig.servo.prepare(accel, decel, Duration::from_secs_f64(sequence.lease_s)).await?;
     rig.brake.prepare(rig.profile.brake.voltage_v).await?;
     rig.servo.set_motor_rpm(0.0).await?;
+    rig.heed_stop()?;
     rig.servo.set_enabled(true).await?;
     rig.until("the first encoder samples", 2.0, |acquisition| acquisition.samples() > 0).await
 }

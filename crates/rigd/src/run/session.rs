@@ -113,6 +113,8 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
             }
             let troubles = rig.switch_off(rig.stop.hurried()).await;
             rig.progress.finish();
+            // A stop that came while the rig was stopping by itself was a stop all the same.
+            let halt = halt.or_else(|| rig.heed_stop().err());
             (halt, troubles)
         }
         Err(error) => {

@@ -8,6 +8,7 @@ pub mod emulator;
 pub mod plant;
 pub mod pty;
 pub mod serve;
+pub mod starter;
 pub mod world;
 
 use std::cell::RefCell;
@@ -22,6 +23,7 @@ use thiserror::Error;
 pub use plant::PlantSpec;
 use plant::undocumented::UNDOCUMENTED;
 use pty::Terminal;
+use starter::Starter;
 use world::World;
 
 use crate::profile::Profile;
@@ -129,7 +131,8 @@ pub fn start_in_process(spec: &PlantSpec, rate_hz: f64, seed: u64) -> Result<Lin
     Ok(Links { servo: Some(Box::new(servo)), brake: Some(Box::new(brake)), counter: Some(Box::new(counter)) })
 }
 
-/// Serves the rig on pseudo-terminals in `directory` until a stop is asked for; prints a line a device, then `ready`.
+/// Serves the rig on pseudo-terminals in `directory` until a stop is asked for, or the run that started it dies; prints a line a
+/// device, then `ready`.
 ///
 /// # Errors
 /// [`SimError`] when the plant cannot be built or a port cannot be made.
@@ -141,6 +144,7 @@ pub async fn serve_ptys(
     stop: StopRequests,
 ) -> Result<(), SimError> {
     use std::io::Write as _;
+    let starter = Starter::look();
     let io = |what: String| move |source| SimError::Io { what, source };
     let directory = directory.canonicalize().map_err(io(format!("directory {}", directory.display())))?;
     let world = Rc::new(RefCell::new(World::new(spec, world::IDLE_RATE_HZ, seed)?));
@@ -159,6 +163,8 @@ pub async fn serve_ptys(
     tokio::task::spawn_local(serve::modbus(servo, Rc::clone(&world), serve::Slave::servo(&profile)));
     tokio::task::spawn_local(serve::modbus(brake, Rc::clone(&world), serve::Slave::brake(&profile)));
     tokio::task::spawn_local(serve::counter(counter, Rc::clone(&world)));
+    // Whoever has gone before `ready` was printed never learns the ports; later nobody needs to read.
+    let unheard = || io("standard output".into());
     let mut out = std::io::stdout();
     let ports = [
         ("servo", &profile.servo.port, profile.servo.baud, &profile.servo.format, profile.servo.unit),
@@ -166,15 +172,20 @@ pub async fn serve_ptys(
         ("counter", &profile.counter.port, profile.counter.baud, &profile.counter.format, profile.counter.unit),
     ];
     for (name, path, baud, format, unit) in ports {
-        // Whoever started us may have stopped reading; the rig runs on.
-        let _ = writeln!(out, "{name} {path} {baud} {format} unit {unit}");
+        writeln!(out, "{name} {path} {baud} {format} unit {unit}").map_err(unheard())?;
     }
-    let _ = writeln!(out, "ready").and_then(|()| out.flush());
-    while !stop.any() {
+    writeln!(out, "ready").and_then(|()| out.flush()).map_err(unheard())?;
+    while !stop.any() && !starter.has_died() {
         tokio::time::sleep(Duration::from_millis(50)).await;
         for port in [&at_servo, &at_brake, &at_counter] {
             port.unlock();
         }
+    }
+    if starter.has_died() {
+        // The run made the directory for itself and cannot clear it away any more.
+        drop((at_servo, at_brake, at_counter));
+        let _ = std::fs::remove_file(&written);
+        let _ = std::fs::remove_dir(&directory);
     }
     Ok(())
 }
