@@ -5,7 +5,7 @@
 //! - [`recover()`] finalises what a killed writer left.
 //! - [`info()`] says what is in a log; [`RunStream`] and [`read_runs`] give its runs as shaft angles.
 //!
-//! Channels, metadata and units are those of `docs` and of `proto/rig.proto`; times are ns since the Unix epoch.
+//! Messages and their units are those of `proto/rig.proto`; times are ns since the Unix epoch.
 
 mod batch;
 mod completeness;
@@ -29,7 +29,7 @@ pub use error::{BatchError, LogError};
 pub use info::{AttachmentInfo, ChannelInfo, LogInfo, RunInfo, info};
 pub use metadata::{AngleScale, EncoderMetadata, MetadataMap, RunMetadata};
 pub use reader::{LogReader, Record};
-pub use recover::{Recovery, recover, recover_directory};
+pub use recover::{RecoveredFile, Recovery, recover, recover_directory};
 pub use run_stream::{RunStream, RunVisitor, SampleBlock, StreamTotals};
 pub use runs::{RecordedRun, RunSpan, RunTotals, read_runs};
 pub use topic::Topic;

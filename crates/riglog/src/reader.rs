@@ -3,7 +3,7 @@
 use std::{
     fs::File,
     io::{BufReader, Read, Seek, SeekFrom},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use prost::Message;
@@ -100,6 +100,7 @@ pub enum Record {
 /// An error item is about one record, or about the disk; the iterator goes on where it can.
 pub struct LogReader<R = BufReader<File>> {
     walk: Walk<R>,
+    path: PathBuf,
     failed: bool,
 }
 
@@ -124,7 +125,7 @@ impl<R: Read + Seek> LogReader<R> {
         let path = name.as_ref();
         check_channels(Walk::new(&mut source, bytes, path)?)?;
         source.seek(SeekFrom::Start(0)).map_err(LogError::io("read", path))?;
-        Ok(Self { walk: Walk::new(source, bytes, path)?, failed: false })
+        Ok(Self { walk: Walk::new(source, bytes, path)?, path: path.to_owned(), failed: false })
     }
 
     /// Whether the log is whole; `None` until the iterator has ended.
@@ -145,22 +146,13 @@ impl<R: Read + Seek> Iterator for LogReader<R> {
         if self.failed {
             return None;
         }
-        // Two short borrows: the path is only cloned where an error needs it.
-        let record = match self.walk.next() {
-            Ok(None) => return None,
-            Ok(Some(event)) => decode(event),
+        match self.walk.next() {
+            Ok(event) => event.map(|event| decode(event, &self.path)),
             Err(error) => {
                 self.failed = true;
-                return Some(Err(error));
+                Some(Err(error))
             }
-        };
-        Some(record.map_err(|undecoded| undecoded.naming(self.walk.path())).map(|record| match record {
-            Decoded::Record(record) => record,
-            Decoded::Unknown(channel) => {
-                let topic = self.walk.channel(channel).map(|c| c.name.clone()).unwrap_or_default();
-                Record::Unknown { topic }
-            }
-        }))
+        }
     }
 }
 
@@ -192,28 +184,6 @@ pub(crate) fn check_channels<R: Read + Seek>(mut walk: Walk<R>) -> Result<(), Lo
     Err(LogError::NoRigChannels { path: walk.path().to_owned(), topics })
 }
 
-enum Decoded {
-    Record(Record),
-    Unknown(u16),
-}
-
-/// A record that does not decode, before the file is named.
-enum Undecoded {
-    Message { topic: Topic, log_time_ns: u64, at_byte: u64, source: prost::DecodeError },
-    Other(LogError),
-}
-
-impl Undecoded {
-    fn naming(self, path: &Path) -> LogError {
-        match self {
-            Self::Other(error) => error,
-            Self::Message { topic, log_time_ns, at_byte, source } => {
-                bad_message(path, topic, log_time_ns, at_byte, source)
-            }
-        }
-    }
-}
-
 pub(crate) fn bad_message(
     path: &Path,
     topic: Topic,
@@ -225,15 +195,15 @@ pub(crate) fn bad_message(
     LogError::BadMessage { path: path.to_owned(), topic, schema, log_time_ns, at_byte, source }
 }
 
-fn decode(event: Event<'_>) -> Result<Decoded, Undecoded> {
-    let (chunk_at, topic, message) = match event {
-        Event::Message { chunk_at, topic, message } => (chunk_at, topic, message),
-        Event::Metadata { name, map } => return metadata(name, map).map(Decoded::Record).map_err(Undecoded::Other),
+fn decode(event: Event<'_>, path: &Path) -> Result<Record, LogError> {
+    let (at_byte, topic, channel, message) = match event {
+        Event::Message { chunk_at, topic, channel, message } => (chunk_at, topic, channel, message),
+        Event::Metadata { name, map } => return metadata(name, map),
         Event::Attachment { name, media_type, data } => {
-            return Ok(Decoded::Record(Record::Attachment { name, media_type, data: data.to_vec() }));
+            return Ok(Record::Attachment { name, media_type, data: data.to_vec() });
         }
     };
-    let Some(topic) = topic else { return Ok(Decoded::Unknown(message.channel)) };
+    let Some(topic) = topic else { return Ok(Record::Unknown { topic: channel.to_owned() }) };
     let (log_time_ns, publish_time_ns, data) = (message.log_time_ns, message.publish_time_ns, message.data);
     let record = match topic {
         Topic::Angles => AngleBatch::decode(data).map(|batch| Record::Angles { log_time_ns, publish_time_ns, batch }),
@@ -244,7 +214,7 @@ fn decode(event: Event<'_>) -> Result<Decoded, Undecoded> {
         }
         Topic::Events => foxglove::Log::decode(data).map(|event| Record::Event { log_time_ns, publish_time_ns, event }),
     };
-    record.map(Decoded::Record).map_err(|source| Undecoded::Message { topic, log_time_ns, at_byte: chunk_at, source })
+    record.map_err(|source| bad_message(path, topic, log_time_ns, at_byte, source))
 }
 
 fn metadata(name: String, map: MetadataMap) -> Result<Record, LogError> {

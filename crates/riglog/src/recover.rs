@@ -39,6 +39,9 @@ pub struct Recovery {
     pub found: Completeness,
 }
 
+/// A file of a directory and what became of it.
+pub type RecoveredFile = (PathBuf, Result<Recovery, LogError>);
+
 /// Gives a log that was cut off its end, in place: nothing that is whole is moved or copied, so a crash in the
 /// middle leaves a file that can be recovered again. A file that has an end is left as it is.
 ///
@@ -69,7 +72,7 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovery, LogError> {
 ///
 /// # Errors
 /// The directory cannot be listed.
-pub fn recover_directory(directory: impl AsRef<Path>) -> Result<Vec<(PathBuf, Result<Recovery, LogError>)>, LogError> {
+pub fn recover_directory(directory: impl AsRef<Path>) -> Result<Vec<RecoveredFile>, LogError> {
     let directory = directory.as_ref();
     let entries = match std::fs::read_dir(directory) {
         Ok(entries) => entries,

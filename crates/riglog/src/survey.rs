@@ -57,7 +57,7 @@ pub(crate) fn survey(path: &Path) -> Result<Survey, LogError> {
     };
     while let Some(event) = walk.next()? {
         match event {
-            Event::Message { chunk_at, topic, message } => {
+            Event::Message { chunk_at, topic, message, .. } => {
                 let (log, data) = (message.log_time_ns, message.data);
                 let (first, last) = survey.bounds_ns.unwrap_or((log, log));
                 survey.bounds_ns = Some((first.min(log), last.max(log)));

@@ -1,5 +1,8 @@
 //! A writer that is killed, and disks that take no more: what is left is always readable.
 
+// A test ends at the first surprise.
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use std::{
@@ -144,7 +147,7 @@ fn a_full_disk_ends_the_log_in_order() {
     let path = directory.path().join("a.mcap");
     // A name space of its own, so that the mount goes with the process; the file is copied out of it.
     let shell = format!(
-        "unshare --mount --map-root-user sh -c 'mount -t tmpfs -o size=96k none \"{0}\" && \"$1\" child --exact --nocapture; \
+        "unshare --mount --map-root-user sh -c 'mount -t tmpfs -o size=48k none \"{0}\" && \"$1\" child --exact --nocapture; \
          cp \"{0}/a.mcap\" \"{0}.mcap\"' sh \"$1\"",
         directory.path().display()
     );

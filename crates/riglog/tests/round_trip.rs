@@ -1,5 +1,8 @@
 //! What is written is what is read, by this crate and by the public `mcap` crate.
 
+// A test ends at the first surprise.
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use std::{collections::BTreeMap, io::Cursor};
@@ -132,7 +135,7 @@ fn the_public_reader_sees_the_same_messages_and_summary() {
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     let stats = summary.stats.clone().unwrap();
     assert_eq!(stats.message_count, statistics.messages);
-    assert_eq!(stats.chunk_count as u64, statistics.chunks);
+    assert_eq!(u64::from(stats.chunk_count), statistics.chunks);
     assert_eq!((stats.attachment_count, stats.metadata_count, stats.channel_count), (1, 3, 5));
     let (mut samples, mut count, mut bounds) = (0, 0, (u64::MAX, 0));
     for message in mcap::MessageStream::new(&bytes).unwrap() {

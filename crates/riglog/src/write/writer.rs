@@ -3,15 +3,16 @@
 use std::{
     fs::{File, OpenOptions, TryLockError},
     io,
-    path::{Path, PathBuf},
+    path::Path,
     time::{Duration, Instant},
 };
 
 use prost::Message;
 
 use super::{
-    store::{Store, Tail},
-    sync::Syncer,
+    options::{LogStatistics, WriterOptions},
+    output::Output,
+    store::Store,
 };
 use crate::{
     container::{
@@ -30,51 +31,6 @@ use crate::{
 /// The largest message, text or file that is accepted: far above any that a rig has, far below what readers refuse.
 const MAX_CONTENT_BYTES: usize = 64 << 20;
 
-/// How a log is written.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct WriterOptions {
-    /// Program and version, as `rigd 0.1.0`.
-    pub library: String,
-    /// A chunk is closed when this much log time or this much wall time has passed since its first message.
-    pub chunk_period_ms: u32,
-    /// A chunk is closed at this size, before compression.
-    pub chunk_bytes: usize,
-    /// Data is synced to the disk at least this often.
-    pub sync_period_ms: u32,
-    /// Level of zstd; see [`WriterOptions::new`] for the default.
-    pub compression_level: i32,
-}
-
-impl WriterOptions {
-    /// The project's policy: chunks of 100 ms or 1 MiB, synced every second.
-    ///
-    /// Level 1 is zstd's fastest that still packs the deltas of angles entropy-coded.
-    pub fn new(library: impl Into<String>) -> Self {
-        Self {
-            library: library.into(),
-            chunk_period_ms: 100,
-            chunk_bytes: 1 << 20,
-            sync_period_ms: 1000,
-            compression_level: 1,
-        }
-    }
-}
-
-/// What a finished log holds.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LogStatistics {
-    /// The file.
-    pub path: PathBuf,
-    /// Messages on all channels.
-    pub messages: u64,
-    /// Angle samples.
-    pub samples: u64,
-    /// Chunks.
-    pub chunks: u64,
-    /// Size of the file.
-    pub bytes: u64,
-}
-
 /// Writes one log.
 ///
 /// Every chunk reaches the operating system in one call and as whole records, so a process killed at any
@@ -82,27 +38,14 @@ pub struct LogStatistics {
 /// as it is written. A writer that is dropped without [`LogWriter::finish`] hands over what it has and leaves the
 /// file without an end, because nobody vouched for it.
 pub struct LogWriter {
-    path: PathBuf,
     options: WriterOptions,
-    tail: Tail,
+    output: Output,
     codec: ChunkCompressor,
     chunk: ChunkBuilder,
     /// When the chunk under way got its first message.
     chunk_since: Instant,
     sequences: [u32; Topic::ALL.len()],
-    summary: Summary,
     samples: u64,
-    syncer: Syncer,
-    synced_at: Instant,
-    dirty: bool,
-    failure: Option<Failure>,
-}
-
-/// A failed write, kept for another try at the end.
-struct Failure {
-    source: io::Error,
-    records: Vec<u8>,
-    summary: Summary,
 }
 
 impl LogWriter {
@@ -122,7 +65,10 @@ impl LogWriter {
         lock(&file, path)?;
         let for_sync = file.try_clone().map_err(LogError::io("open", path))?;
         sync_directory_of(path);
-        Self::on(path, Box::new(file), move || for_sync.sync_data(), options)
+        Self::on(path, Box::new(file), move || for_sync.sync_data(), options).inspect_err(|_| {
+            // Nothing was written; an empty file would only puzzle the next start.
+            let _ = std::fs::remove_file(path);
+        })
     }
 
     fn on(
@@ -131,41 +77,36 @@ impl LogWriter {
         sync: impl FnMut() -> io::Result<()> + Send + 'static,
         options: WriterOptions,
     ) -> Result<Self, LogError> {
+        let codec = ChunkCompressor::new(options.compression_level).map_err(|source| LogError::Compress {
+            path: path.to_owned(),
+            bytes: 0,
+            source,
+        })?;
+        let sync_period = Duration::from_millis(options.sync_period_ms.into());
+        let mut output = Output::new(path, store, sync, sync_period)?;
         let mut summary = Summary::default();
         let head = encode_head(&options.library, &mut summary);
-        let now = Instant::now();
-        let mut writer = Self {
-            path: path.to_owned(),
-            tail: Tail::new(store),
-            codec: ChunkCompressor::new(options.compression_level).map_err(|source| LogError::Compress {
-                path: path.to_owned(),
-                bytes: 0,
-                source,
-            })?,
-            chunk: ChunkBuilder::default(),
-            chunk_since: now,
-            sequences: [0; Topic::ALL.len()],
-            summary: Summary::default(),
-            samples: 0,
-            syncer: Syncer::new(sync).map_err(LogError::io("start a thread to sync", path))?,
-            synced_at: now,
-            dirty: false,
-            failure: None,
+        output.hand_over(head, summary)?;
+        output.request_sync();
+        Ok(Self {
             options,
-        };
-        writer.hand_over(head, summary)?;
-        writer.syncer.request();
-        Ok(writer)
+            output,
+            codec,
+            chunk: ChunkBuilder::default(),
+            chunk_since: Instant::now(),
+            sequences: [0; Topic::ALL.len()],
+            samples: 0,
+        })
     }
 
     /// The file.
     pub fn path(&self) -> &Path {
-        &self.path
+        self.output.path()
     }
 
     /// Bytes handed to the operating system so far.
     pub fn bytes(&self) -> u64 {
-        self.tail.at_byte()
+        self.output.at_byte()
     }
 
     /// Adds a batch of angles.
@@ -269,7 +210,7 @@ impl LogWriter {
             out.put_u32(crc);
         });
         let index = AttachmentIndex {
-            offset: self.tail.at_byte(),
+            offset: self.output.at_byte(),
             length: record.len() as u64,
             log_time_ns,
             create_time_ns: log_time_ns,
@@ -277,7 +218,7 @@ impl LogWriter {
             name: name.to_owned(),
             media_type: media_type.to_owned(),
         };
-        self.hand_over(record, Summary { attachments: vec![index], ..Default::default() })
+        self.output.hand_over(record, Summary { attachments: vec![index], ..Default::default() })
     }
 
     /// Closes a chunk that is due by wall time and syncs what is due; to be called when idle, a few times in a
@@ -286,12 +227,12 @@ impl LogWriter {
     /// # Errors
     /// The operating system refused a chunk or a sync.
     pub fn tick(&mut self) -> Result<(), LogError> {
-        self.check_open()?;
+        self.output.check_open()?;
         let due = Duration::from_millis(self.options.chunk_period_ms.into());
         if !self.chunk.is_empty() && self.chunk_since.elapsed() >= due {
             self.close_chunk()?;
         }
-        self.sync_if_due()
+        self.output.sync_if_due()
     }
 
     /// Ends the log: last chunk, summary, sync to disk.
@@ -302,37 +243,21 @@ impl LogWriter {
     /// # Errors
     /// Messages were lost, or the end could not be written or synced.
     pub fn finish(mut self) -> Result<LogStatistics, LogError> {
-        if self.failure.is_none() && !self.chunk.is_empty() {
-            // The failure is noted, and told below together with what became of the file.
-            let _ = self.close_chunk();
-        }
-        let lost = self.failure.take().and_then(|failure| self.retry(failure));
-        let end = self.summary.encode_end(self.tail.at_byte(), self.tail.crc());
-        let (path, at_byte) = (self.path.clone(), self.tail.at_byte());
-        let ended = self.tail.append(&end);
-        self.syncer.request();
-        let not_synced = self.syncer.finish();
-        if let Some(Failure { source, records, summary }) = lost {
-            return Err(LogError::Incomplete {
-                path,
-                lost_messages: summary.messages(),
-                at_byte,
-                wanted_bytes: records.len() as u64,
-                finalised: ended.is_ok(),
-                source,
-            });
-        }
-        let wanted_bytes = end.len() as u64;
-        ended.map_err(|source| LogError::Write { path, at_byte, wanted_bytes, source })?;
-        if let Some(source) = not_synced {
-            return Err(LogError::io("sync", &self.path)(source));
+        let unclosed = match self.chunk.is_empty() || self.output.has_failed() {
+            true => None,
+            false => self.close_chunk().err(),
+        };
+        // What the disk refused is tried again and told by this; what was not even compressed is told after it.
+        self.output.finish()?;
+        if let Some(error @ LogError::Compress { .. }) = unclosed {
+            return Err(error);
         }
         Ok(LogStatistics {
-            path: self.path.clone(),
-            messages: self.summary.messages(),
+            path: self.output.path().to_owned(),
+            messages: self.output.summary().messages(),
             samples: self.samples,
-            chunks: self.summary.chunks.len() as u64,
-            bytes: self.tail.at_byte(),
+            chunks: self.output.summary().chunks.len() as u64,
+            bytes: self.output.at_byte(),
         })
     }
 
@@ -343,7 +268,7 @@ impl LogWriter {
         publish_time_ns: u64,
         message: &impl Message,
     ) -> Result<(), LogError> {
-        self.check_open()?;
+        self.output.check_open()?;
         self.check_size("a message", message.encoded_len())?;
         let period_ns = u64::from(self.options.chunk_period_ms) * 1_000_000;
         // The message that would make a chunk longer than its period opens the next one.
@@ -360,7 +285,7 @@ impl LogWriter {
         if self.chunk.bytes() >= self.options.chunk_bytes || self.chunk_since.elapsed() >= due {
             self.close_chunk()?;
         }
-        self.sync_if_due()
+        self.output.sync_if_due()
     }
 
     fn metadata(&mut self, name: &'static str, map: &MetadataMap) -> Result<(), LogError> {
@@ -371,28 +296,21 @@ impl LogWriter {
             out.put_str(name);
             out.put_map(map);
         });
-        let (offset, length) = (self.tail.at_byte(), record.len() as u64);
+        let (offset, length) = (self.output.at_byte(), record.len() as u64);
         let index = MetadataIndex { offset, length, name: name.to_owned() };
-        self.hand_over(record, Summary { metadata: vec![index], ..Default::default() })
-    }
-
-    fn check_open(&self) -> Result<(), LogError> {
-        match self.failure {
-            None => Ok(()),
-            Some(_) => Err(LogError::Stopped { path: self.path.clone(), at_byte: self.tail.at_byte() }),
-        }
+        self.output.hand_over(record, Summary { metadata: vec![index], ..Default::default() })
     }
 
     fn check_size(&self, what: &'static str, bytes: usize) -> Result<(), LogError> {
         if bytes <= MAX_CONTENT_BYTES {
             return Ok(());
         }
-        Err(LogError::TooLarge { path: self.path.clone(), what, bytes, limit: MAX_CONTENT_BYTES as u64 })
+        Err(LogError::TooLarge { path: self.path().to_owned(), what, bytes, limit: MAX_CONTENT_BYTES as u64 })
     }
 
     /// Records outside of chunks follow the messages that were given before them.
     fn begin_lone_record(&mut self) -> Result<(), LogError> {
-        self.check_open()?;
+        self.output.check_open()?;
         if self.chunk.is_empty() { Ok(()) } else { self.close_chunk() }
     }
 
@@ -401,74 +319,24 @@ impl LogWriter {
         let mut records = Vec::new();
         let index = self
             .chunk
-            .encode(&mut self.codec, self.tail.at_byte(), &mut records)
-            .map_err(|source| LogError::Compress { path: self.path.clone(), bytes: self.chunk.bytes(), source })?;
+            .encode(&mut self.codec, self.output.at_byte(), &mut records)
+            .map_err(|source| LogError::Compress { path: self.path().to_owned(), bytes: self.chunk.bytes(), source })?;
         let mut summary = Summary { chunks: vec![index], ..Default::default() };
         summary.widen(self.chunk.bounds_ns());
         self.chunk.counts().for_each(|(channel, messages)| summary.add_message_count(channel, messages));
         self.chunk.clear();
-        self.hand_over(records, summary)
-    }
-
-    /// Hands whole records to the operating system; `summary` tells what they hold.
-    fn hand_over(&mut self, records: Vec<u8>, summary: Summary) -> Result<(), LogError> {
-        match self.tail.append(&records) {
-            Ok(()) => {
-                self.summary.append(summary);
-                self.dirty = true;
-                Ok(())
-            }
-            Err(source) => {
-                let error = LogError::Write {
-                    path: self.path.clone(),
-                    at_byte: self.tail.at_byte(),
-                    wanted_bytes: records.len() as u64,
-                    source: copy_of(&source),
-                };
-                self.failure = Some(Failure { source, records, summary });
-                Err(error)
-            }
-        }
-    }
-
-    /// Tries once more what could not be written; returns what still cannot.
-    fn retry(&mut self, failure: Failure) -> Option<Failure> {
-        let Failure { records, summary, .. } = failure;
-        match self.tail.append(&records) {
-            Ok(()) => {
-                self.summary.append(summary);
-                None
-            }
-            Err(source) => Some(Failure { source, records, summary }),
-        }
-    }
-
-    fn sync_if_due(&mut self) -> Result<(), LogError> {
-        if let Some(source) = self.syncer.error() {
-            return Err(LogError::io("sync", &self.path)(source));
-        }
-        let period = Duration::from_millis(self.options.sync_period_ms.into());
-        if self.dirty && self.synced_at.elapsed() >= period {
-            self.syncer.request();
-            (self.dirty, self.synced_at) = (false, Instant::now());
-        }
-        Ok(())
+        self.output.hand_over(records, summary)
     }
 }
 
 impl Drop for LogWriter {
     fn drop(&mut self) {
-        if !self.chunk.is_empty() && self.failure.is_none() {
+        if !self.chunk.is_empty() && !self.output.has_failed() {
             // Nobody is left to tell; the next start finds the file without an end.
             let _ = self.close_chunk();
-            self.syncer.request();
+            self.output.request_sync();
         }
     }
-}
-
-/// The same error once more: one for the caller, one for the end of the log.
-fn copy_of(error: &io::Error) -> io::Error {
-    error.raw_os_error().map_or_else(|| error.kind().into(), io::Error::from_raw_os_error)
 }
 
 /// Makes the new file's name survive a power cut. Where a file system does not sync directories, nothing is lost
