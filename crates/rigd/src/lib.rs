@@ -10,6 +10,7 @@ pub mod cli;
 pub mod clock;
 pub mod device;
 pub mod link;
+pub mod pair;
 pub mod plot;
 pub mod present;
 pub mod profile;

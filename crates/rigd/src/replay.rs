@@ -9,7 +9,7 @@ use riglog::{LogError, RunSpan, RunStream, RunTotals, RunVisitor, SampleBlock};
 use thiserror::Error;
 
 use crate::analysis::Analysis;
-use crate::cli::PairError;
+use crate::pair::PairError;
 
 /// Why a log cannot be replayed.
 #[derive(Debug, Error)]

@@ -277,9 +277,6 @@ impl Summary {
             writeln!(out, "plot    {plot}")?;
         }
         writeln!(out, "te_hash {}", self.te_hash)?;
-        for warning in &self.warnings {
-            writeln!(out, "warning {warning}")?;
-        }
         if self.ended != "done" {
             writeln!(out, "ended   {}", self.ended)?;
         }

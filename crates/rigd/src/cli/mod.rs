@@ -1,13 +1,12 @@
 //! The command line. One command is one file; here they are only routed.
 
 mod info;
-mod input;
+mod directions;
 mod replay;
 mod run;
 mod sim;
 mod stop;
 
-pub use input::PairError;
 
 use std::process::ExitCode;
 

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Exit, fail, input, print};
+use super::{Exit, fail, print};
 use crate::analysis::Analysis;
+use crate::pair;
 use crate::replay::{self, ReplayError};
 use crate::summary::{Origin, Summary};
 
@@ -49,10 +50,10 @@ fn run(args: &Args) -> Result<Exit, Box<dyn std::error::Error>> {
     let first = &args.logs[0];
     let (pair_in_log, backend) = replay::head(first).map_err(ReplayError::Log)?;
     let model = match &args.pair {
-        Some(path) => input::pair(Some(path))?.1,
+        Some(path) => pair::load(Some(path))?.1,
         None => {
             let text = pair_in_log.ok_or_else(|| ReplayError::NoPair { path: first.clone() })?;
-            input::parse(&text, Path::new("pair.toml"))
+            pair::parse(&text, Path::new("pair.toml"))
                 .map_err(|source| ReplayError::Pair { path: first.clone(), source })?
         }
     };

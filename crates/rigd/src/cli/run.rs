@@ -7,7 +7,7 @@ use std::time::Duration;
 use riglog::LogError;
 use tokio::task::LocalSet;
 
-use super::input::{self, Directions};
+use super::directions::Directions;
 use super::{Exit, fail, print, stop};
 use crate::clock::Clock;
 use crate::profile::Profile;
@@ -17,7 +17,7 @@ use crate::run::rig::slip_power_w;
 use crate::run::session::{self, Links, Outcome, Setup};
 use crate::run::stop::StopRequests;
 use crate::summary::{Origin, Summary};
-use crate::{plot, sim};
+use crate::{pair, plot, sim};
 
 /// Slower slip than this makes powder brakes stick and slip, rpm.
 const STICK_SLIP_RPM: f64 = 10.0;
@@ -142,7 +142,7 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
         None => Profile::simulated(),
     };
     session::check_drivers(&profile)?;
-    let (pair_toml, model) = input::pair(args.model.as_deref().or(args.pair.as_deref()))?;
+    let (pair_toml, model) = pair::load(args.model.as_deref().or(args.pair.as_deref()))?;
     let plan = Plan {
         directions: args.direction.list(),
         loads_nm: args.load.0.clone(),

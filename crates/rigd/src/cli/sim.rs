@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use tokio::task::LocalSet;
 
-use super::{Exit, fail, input};
+use super::{Exit, fail};
 use crate::profile::Profile;
 use crate::run::stop::StopRequests;
-use crate::sim;
+use crate::{pair, sim};
 
 /// Start the simulated rig in real time, on ports of its own.
 #[derive(Debug, clap::Args)]
@@ -28,7 +28,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn main(args: &Args) -> Exit {
-    let spec = match input::pair(args.pair.as_deref()) {
+    let spec = match pair::load(args.pair.as_deref()) {
         Ok((_, model)) => sim::spec(&model, &args.undocumented),
         Err(error) => return fail(Exit::BadInput, &error),
     };

@@ -1,8 +1,8 @@
-//! Inputs that several commands take: the gear pair and the senses.
+//! The gear pair in force: from a file, from a log, or built in.
 
 use std::path::{Path, PathBuf};
 
-use gearmodel::{Direction, GeometryError, NominalModel, PairFile, PairFileError};
+use gearmodel::{GeometryError, NominalModel, PairFile, PairFileError};
 use thiserror::Error;
 
 use crate::profile::DEFAULT_PAIR;
@@ -40,7 +40,7 @@ pub enum PairError {
 ///
 /// # Errors
 /// [`PairError`] names the file, the key and the limit.
-pub fn pair(path: Option<&Path>) -> Result<(String, NominalModel), PairError> {
+pub fn load(path: Option<&Path>) -> Result<(String, NominalModel), PairError> {
     let (text, path) = match path {
         None => (DEFAULT_PAIR.to_owned(), Path::new("(built in)")),
         Some(path) => {
@@ -61,27 +61,4 @@ pub fn parse(text: &str, path: &Path) -> Result<NominalModel, PairError> {
         .map_err(|source| PairError::Text { path: path.into(), source })?
         .model()
         .map_err(|source| PairError::Geometry { path: path.into(), source })
-}
-
-/// Senses in the order in which they are run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Directions {
-    /// Counter-clockwise alone.
-    Ccw,
-    /// Clockwise alone.
-    Cw,
-    /// Counter-clockwise, then clockwise.
-    Both,
-}
-
-impl Directions {
-    /// As a list.
-    #[must_use]
-    pub fn list(self) -> Vec<Direction> {
-        match self {
-            Self::Ccw => vec![Direction::Ccw],
-            Self::Cw => vec![Direction::Cw],
-            Self::Both => vec![Direction::Ccw, Direction::Cw],
-        }
-    }
 }
