@@ -83,13 +83,13 @@ async fn home(rig: &mut Rig) -> Result<(), Halt> {
     let patience =
         rig.ramp_s(speed) + 60.0 / speed * 1.5 / rig.acquisition.borrow().analysis().model().pair.closure().min(1.0);
     let outcome = rig.until("homing", patience, super::acquire::Acquisition::index_seen).await;
-    if let Err(Halt::TooLong { .. }) = outcome {
-        let acquisition = rig.acquisition.borrow();
-        return Err(acquisition
-            .missing_index()
-            .map_or(Halt::Operator, |which| Halt::NoIndex { which, turns: patience * speed / 60.0 }));
+    if let Err(halt) = outcome {
+        let missing = rig.acquisition.borrow().missing_index();
+        return Err(match (halt, missing) {
+            (Halt::TooLong { .. }, Some(which)) => Halt::NoIndex { which, turns: patience * speed / 60.0 },
+            (halt, _) => halt,
+        });
     }
-    outcome?;
     rig.acquisition.borrow_mut().home();
     Ok(())
 }

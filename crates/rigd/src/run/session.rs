@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use gearmodel::NominalModel;
+use nix::libc::SIGXFSZ;
 use riglog::proto::Level;
 use riglog::{LogError, RunMetadata, WriterOptions};
+use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use super::Plan;
 use super::acquire::Acquisition;
@@ -90,6 +92,7 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
             ..WriterOptions::new(SOFTWARE)
         },
     )?;
+    let _size_limit = outlive_size_limit();
     describe(&recorder, &setup, clock);
     let analysis = Analysis::new(setup.model.clone());
     let acquisition = Rc::new(RefCell::new(Acquisition::new(recorder, clock, analysis)));
@@ -141,6 +144,12 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
         }
     }
     Ok(Outcome { analysis, halt, troubles, lost, unwritten })
+}
+
+/// A log that reaches the process's file size limit (`ulimit -f`) shall be an error of the write and a stop in order; unhandled, the
+/// signal would kill the daemon with the motor on.
+fn outlive_size_limit() -> Option<Signal> {
+    signal(SignalKind::from_raw(SIGXFSZ)).inspect_err(|error| tracing::warn!("SIGXFSZ is not handled: {error}")).ok()
 }
 
 /// Metadata and attachments that say what this log is.
