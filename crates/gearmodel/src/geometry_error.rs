@@ -92,6 +92,10 @@ pub enum GeometryError {
         closing_mm: f64,
     },
 
+    /// A drive of which no teeth are known.
+    #[error("a constant-ratio drive has no known teeth to draw: describe the gears as circular")]
+    NoTeeth,
+
     /// A pitch curve that a rack cannot roll on.
     #[error(
         "the pitch curve of gear {gear} is concave at theta1 = {theta1_rad:.6} rad (radius of curvature {radius_mm:.3} mm):          no rack or hob reaches it; shape or erode the gear, or take a rounder curve"

@@ -225,6 +225,12 @@ impl ContactModel {
             + sign * lead_mm / common_normal::driven_base_arm_mm(&self.pair, &at, direction))
     }
 
+    /// Contact ratio of a driver tooth's flank: the pitches of rolling between the tips of both gears.
+    #[must_use]
+    pub fn contact_ratio(&self, tooth: u32, direction: Direction) -> f64 {
+        self.tips.contact_ratio(i64::from(tooth), direction)
+    }
+
     /// Lead of a tooth pair at its contact, mm along the normal.
     fn lead_mm(&self, touch: &Touch, tooth: i64, phase: f64) -> f64 {
         let direction = touch.direction;

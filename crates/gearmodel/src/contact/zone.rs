@@ -12,6 +12,8 @@ use crate::{Direction, GearPair};
 #[derive(Clone, Debug)]
 pub(super) struct Tips {
     pitch_mm: f64,
+    /// How far thinning moves each gear's flank along the rack, mm.
+    thinning_mm: f64,
     /// Reach of gear 1's flanks, ccw then cw, by tooth: contact beyond it (in the sense of motion) is off the tip.
     driver_mm: [Vec<f64>; 2],
     /// Reach of gear 2's flanks: contact before it has not reached the tip yet.
@@ -24,15 +26,16 @@ impl Tips {
     /// Tips of a pair; empty without teeth.
     pub(super) fn of(pair: &GearPair) -> Self {
         let pitch_mm = pair.pitch_mm().unwrap_or(f64::NAN);
+        let thinning_mm = 0.25 * pair.backlash_mm();
         let (z1, z2) = pair.teeth();
         let reaches = |gear: Gear, teeth: u32| {
             Direction::BOTH
-                .map(|side| (0..teeth).map(|tooth| tip_reach_mm(pair, gear, i64::from(tooth), side)).collect())
+                .map(|side| (0..teeth).map(|tooth| pair.tip_of(gear, i64::from(tooth), side).reach_mm).collect())
         };
         let driver_mm: [Vec<f64>; 2] = reaches(Gear::Driver, z1);
         let driven_mm: [Vec<f64>; 2] = reaches(Gear::Driven, z2);
         let longest_mm = driver_mm.iter().chain(&driven_mm).flatten().copied().fold(0.0, f64::max);
-        Self { pitch_mm, driver_mm, driven_mm, longest_mm }
+        Self { pitch_mm, thinning_mm, driver_mm, driven_mm, longest_mm }
     }
 
     /// Pitch along the pitch curve, mm.
@@ -48,6 +51,15 @@ impl Tips {
         ((low / self.pitch_mm - half).ceil() as i64)..=((high / self.pitch_mm - half).floor() as i64)
     }
 
+    /// Pitches of rolling for which a tooth's flank can be in contact.
+    pub(super) fn contact_ratio(&self, tooth: i64, direction: Direction) -> f64 {
+        let side = side_index(direction);
+        let reach = |table: &[f64]| {
+            table.get(tooth.rem_euclid(table.len().max(1) as i64) as usize).copied().unwrap_or(f64::NAN)
+        };
+        (reach(&self.driver_mm[side]) + reach(&self.driven_mm[side])) / self.pitch_mm
+    }
+
     /// Position of a tooth's contact in pitches of rolling from its pitch point, when it is within both tips.
     pub(super) fn phase_in_zone(&self, touch: &Touch, tooth: i64) -> Option<f64> {
         let side = side_index(touch.direction);
@@ -55,52 +67,13 @@ impl Tips {
         let origin_mm = (tooth as f64 + half) * self.pitch_mm;
         // Towards the tip of gear 1 the rack's offset grows on the ccw flank and falls on the cw flank.
         let sign = touch.direction.sign();
-        let on_driver_mm = touch.arc_a_mm - origin_mm;
-        let on_driven_mm = touch.arc_b_mm - origin_mm;
+        let on_driver_mm = touch.arc_a_mm - origin_mm - sign * self.thinning_mm;
+        let on_driven_mm = touch.arc_b_mm - origin_mm + sign * self.thinning_mm;
         let reach = |table: &[f64]| table.get(tooth.rem_euclid(table.len().max(1) as i64) as usize).copied();
         let within = sign * on_driver_mm <= reach(&self.driver_mm[side])?
             && -sign * on_driven_mm <= reach(&self.driven_mm[side])?;
-        within.then_some(on_driver_mm / self.pitch_mm)
+        within.then_some((touch.arc_a_mm - origin_mm) / self.pitch_mm)
     }
-}
-
-/// Rack offset |d| at which a flank reaches the tip curve, mm, by the secant method on the true height.
-fn tip_reach_mm(pair: &GearPair, gear: Gear, tooth: i64, side: Direction) -> f64 {
-    let addendum_mm = pair.addendum() * pair.module_mm();
-    let (sin_alpha, cos_alpha) = pair.pressure_angle_rad().sin_cos();
-    let half = if side == Direction::Ccw { 0.0 } else { 0.5 };
-    let origin_mm = (tooth as f64 + half) * std::f64::consts::PI * pair.module_mm();
-    // The tip of gear 1 is met at positive height, that of gear 2 at negative height over the pitch line.
-    let outward = if gear == Gear::Driver { 1.0 } else { -1.0 };
-    let excess = |reach_mm: f64| {
-        let d_mm = outward * side.sign() * reach_mm;
-        let roll = pair.roll(pair.theta1_at_arc_length(origin_mm + d_mm));
-        let contact = pair.rack_contact(&roll, d_mm, side);
-        let body = pair.to_body(gear, &roll, contact);
-        pair.height_over_pitch_curve(gear, body, roll.at.theta1_rad).0 - addendum_mm
-    };
-    // The rack itself would reach the height here; the curve's bending away brings the tip nearer.
-    let (mut low, mut high) = (0.0, addendum_mm / (sin_alpha * cos_alpha));
-    if excess(high) < 0.0 {
-        // A concave pitch curve bends the tip out of the rack's reach.
-        high *= 2.0;
-    }
-    // Bracketed false position (Illinois): the height grows with the reach.
-    let (mut at_low, mut at_high) = (-addendum_mm, excess(high));
-    for _ in 0..60 {
-        let middle = (low * at_high - high * at_low) / (at_high - at_low);
-        let at_middle = excess(middle);
-        if at_middle.abs() < 1e-11 || (high - low).abs() < 1e-12 {
-            return middle;
-        }
-        if at_middle * at_high < 0.0 {
-            (low, at_low) = (high, at_high);
-        } else {
-            at_low *= 0.5;
-        }
-        (high, at_high) = (middle, at_middle);
-    }
-    high
 }
 
 #[cfg(test)]
