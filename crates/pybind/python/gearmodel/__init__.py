@@ -40,3 +40,8 @@ __all__ = [
     "backlash_from",
     "read_log",
 ]
+
+# Functions of the native half say where users find them, as its classes do by themselves.
+for _function in (analyse, backlash_from, read_log):
+    _function.__module__ = __name__
+del _function
