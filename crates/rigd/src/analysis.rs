@@ -30,6 +30,8 @@ pub struct MeasuredBacklash {
 pub struct Analysis {
     model: NominalModel,
     active: Option<RunTe>,
+    /// Mean curve of the run that the active one makes a backlash with.
+    opposite: Option<(Direction, Curve)>,
     runs: Vec<MeasuredRun>,
     backlash: Vec<MeasuredBacklash>,
     hash: Sha256,
@@ -39,7 +41,7 @@ impl Analysis {
     /// An analysis against `model`.
     #[must_use]
     pub fn new(model: NominalModel) -> Self {
-        Self { model, active: None, runs: Vec::new(), backlash: Vec::new(), hash: Sha256::new() }
+        Self { model, active: None, opposite: None, runs: Vec::new(), backlash: Vec::new(), hash: Sha256::new() }
     }
 
     /// The model in force.
@@ -62,6 +64,10 @@ impl Analysis {
 
     /// Begins a run.
     pub fn begin(&mut self, conditions: RunConditions) {
+        self.opposite = self.partner(&conditions).map(|run| {
+            let te = &self.runs[run].te;
+            (te.conditions().direction, te.mean_curve())
+        });
         self.active = Some(RunTe::new(AngleGrid::default(), conditions));
     }
 
@@ -71,19 +77,36 @@ impl Analysis {
         self.active.as_mut()?.push(&self.model.pair, theta1_rad, theta2_rad)
     }
 
-    /// Ends the run; the backlash when the other sense has been seen at its load and speed.
-    pub fn end(&mut self, losses: u64, duration_s: f64) -> Option<&MeasuredBacklash> {
-        let te = self.active.take()?;
-        let conditions = te.conditions();
-        let hash = &mut self.hash;
-        te.for_each_hashed_value(&mut |value| hash.update(value.to_le_bytes()));
-        let this = self.runs.len();
-        let partner = self.runs.iter().rposition(|run| {
+    /// The latest run in the other sense at the same load and speed.
+    fn partner(&self, conditions: &RunConditions) -> Option<usize> {
+        self.runs.iter().rposition(|run| {
             let other = run.te.conditions();
             other.direction != conditions.direction
                 && other.load_nm == conditions.load_nm
                 && other.speed_rpm == conditions.speed_rpm
-        });
+        })
+    }
+
+    /// Backlash at a point of the active run, live: against the other sense's mean curve, once there is one.
+    #[must_use]
+    pub fn live_backlash_rad(&self, point: &TePoint) -> Option<f64> {
+        let (direction, curve) = self.opposite.as_ref()?;
+        let other = *curve.values_rad.get(point.bin)?;
+        let backlash = match direction {
+            Direction::Ccw => point.te_rad - other,
+            Direction::Cw => other - point.te_rad,
+        };
+        backlash.is_finite().then_some(backlash)
+    }
+
+    /// Ends the run; the backlash when the other sense has been seen at its load and speed.
+    pub fn end(&mut self, losses: u64, duration_s: f64) -> Option<&MeasuredBacklash> {
+        let te = self.active.take()?;
+        let conditions = te.conditions();
+        let partner = self.partner(&conditions);
+        let hash = &mut self.hash;
+        te.for_each_hashed_value(&mut |value| hash.update(value.to_le_bytes()));
+        let this = self.runs.len();
         self.runs.push(MeasuredRun { te, losses, duration_s });
         let partner = partner?;
         let (ccw, cw) = if conditions.direction == Direction::Ccw { (this, partner) } else { (partner, this) };

@@ -1,12 +1,11 @@
 //! The command line. One command is one file; here they are only routed.
 
-mod info;
 mod directions;
+mod info;
 mod replay;
 mod run;
 mod sim;
 mod stop;
-
 
 use std::process::ExitCode;
 

@@ -38,6 +38,13 @@ pub struct BusStatistics {
     pub damaged: u64,
 }
 
+impl std::fmt::Display for BusStatistics {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { answered, retried, timeouts, damaged } = self;
+        write!(f, "{answered} requests answered, {retried} sent again ({timeouts} timed out, {damaged} damaged)")
+    }
+}
+
 /// Why a transaction failed.
 #[derive(Debug, Error)]
 pub enum BusError {

@@ -68,6 +68,8 @@ pub struct Latest {
     pub te_rad: f64,
     /// Smallest and largest TE of the active run, rad.
     pub te_range_rad: [f64; 2],
+    /// Latest backlash, rad; once the other sense has been recorded at this load.
+    pub backlash_rad: Option<f64>,
     /// Revolutions of the active run.
     pub revolutions: f64,
     /// Largest |TE − model − zero| of the last batch, rad.
@@ -220,6 +222,12 @@ impl Acquisition {
             .zip(self.index_counts)
             .find(|(_, latched)| latched.is_none())
             .map(|(which, _)| which)
+    }
+
+    /// Forgets the index: one that passed before counts were lost is no zero.
+    pub fn forget_index(&mut self) {
+        self.index_counts = [None; 2];
+        self.homed = false;
     }
 
     /// Takes the index as zero of both angles and writes the encoders' metadata.
@@ -395,6 +403,7 @@ impl Acquisition {
         let model = self.analysis.model().te_rad(point.theta1_rad, direction, self.status.load_setpoint_nm);
         let zero = *self.te_zero_rad.get_or_insert(point.te_rad - model);
         let latest = &mut self.latest;
+        latest.backlash_rad = self.analysis.live_backlash_rad(&point);
         latest.te_rad = point.te_rad;
         latest.te_range_rad = [latest.te_range_rad[0].min(point.te_rad), latest.te_range_rad[1].max(point.te_rad)];
         latest.excursion_rad = latest.excursion_rad.max((point.te_rad - model - zero).abs());

@@ -45,9 +45,10 @@ impl Progress {
         } else {
             "TE -".to_owned()
         };
+        let backlash = latest.backlash_rad.map_or(String::new(), |backlash| format!("  backlash {}", angle(backlash)));
         let direction = rig.status.direction.map_or(String::new(), |direction| direction.to_string());
         self.bar.set_message(format!(
-            "{direction} {recorded_revolutions:.2} rev  {:+.2} rpm  {:.1} N·m  {} samples  lost {}  {te}",
+            "{direction} {recorded_revolutions:.2} rev  {:+.2} rpm  {:.1} N·m  {} samples  lost {}  {te}{backlash}",
             latest.speed_rpm,
             rig.status.load_nm,
             rig.samples(),

@@ -12,6 +12,9 @@ use super::halt::Halt;
 use super::rig::Rig;
 use crate::device::{Counter, DeviceError};
 
+/// Room on a serial line for a sample of both encoders: two bytes each at speed, and the frame's share.
+const BYTES_A_SAMPLE: f64 = 5.0;
+
 /// Runs the plan on a connected rig. The caller switches off afterwards, whatever came back.
 ///
 /// # Errors
@@ -47,10 +50,16 @@ async fn prepare(rig: &mut Rig, mut counter: Box<dyn Counter>, plan: &Plan) -> R
     refuse_over_limit(rig, &encoders, plan).await?;
     counter.start(plan.rate_hz).await?;
     rig.stream_from(counter);
-    let sequence = rig.profile.sequence.clone();
-    let (accel, decel) = (rig.profile.servo.accel_ms, rig.profile.servo.decel_ms);
-    rig.servo.prepare(accel, decel, Duration::from_secs_f64(sequence.lease_s)).await?;
     rig.brake.prepare(rig.profile.brake.voltage_v).await?;
+    // Last, for the drive's watchdog runs from here on.
+    let lease_s = rig.profile.sequence.lease_s;
+    let (accel, decel) = (rig.profile.servo.accel_ms, rig.profile.servo.decel_ms);
+    rig.servo.prepare(accel, decel, Duration::from_secs_f64(lease_s)).await?;
+    rig.acquisition.borrow().event(
+        Level::Info,
+        "lease",
+        format!("the drive's watchdog is armed and read back: it stops the motor {lease_s} s after the last request"),
+    );
     rig.servo.set_motor_rpm(0.0).await?;
     rig.heed_stop()?;
     rig.servo.set_enabled(true).await?;
@@ -70,7 +79,14 @@ async fn refuse_over_limit(rig: &mut Rig, encoders: &crate::device::CounterIdent
     range("servo", &rig.profile.servo.port, "motor speed", asked, allowed, "rpm")?;
     let current = plan.loads_nm.iter().filter_map(|load| rig.profile.brake.current_a(*load)).fold(0.0, f64::max);
     range("brake", &rig.profile.brake.port, "coil current", current, rig.brake.max_current_a(), "A")?;
-    range("counter", &rig.profile.counter.port, "sample rate", plan.rate_hz, encoders.max_rate_hz, "Hz")
+    let counter = &rig.profile.counter;
+    range("counter", &counter.port, "sample rate", plan.rate_hz, encoders.max_rate_hz, "Hz")?;
+    // A serial line carries a tenth of its baud rate in bytes; sockets and pipes have no such bound.
+    if counter.port.starts_with('/') {
+        let limit = f64::from(counter.baud) / 10.0 / BYTES_A_SAMPLE;
+        range("counter", &counter.port, "sample rate over its line", plan.rate_hz, limit, "Hz")?;
+    }
+    Ok(())
 }
 
 /// Turns ccw without load until both indices have passed; they are the zero of both angles.
@@ -78,6 +94,7 @@ async fn home(rig: &mut Rig) -> Result<(), Halt> {
     rig.enter(Phase::Homing);
     let speed = rig.profile.sequence.home_rpm;
     rig.set_load(0.0).await?;
+    rig.acquisition.borrow_mut().forget_index();
     rig.set_speed(Some(Direction::Ccw), speed).await?;
     // Both indices pass within one turn of either gear; a half more forgives the ramp.
     let patience =

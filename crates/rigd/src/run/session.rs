@@ -115,6 +115,9 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
                 acquisition.borrow().event(Level::Error, "halt", halt.to_string());
             }
             let troubles = rig.switch_off(rig.stop.hurried()).await;
+            for (device, line) in [("servo", rig.servo.statistics()), ("brake", rig.brake.statistics())] {
+                acquisition.borrow().event(Level::Info, "line", format!("{device}: {line}"));
+            }
             rig.progress.finish();
             // A stop that came while the rig was stopping by itself was a stop all the same.
             let halt = halt.or_else(|| rig.heed_stop().err());
