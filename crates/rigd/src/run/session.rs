@@ -178,7 +178,7 @@ fn describe(recorder: &Recorder, setup: &Setup, clock: Clock) {
         })),
     );
     let attach = |name, text: &str| {
-        recorder.write(now, now, Entry::Attachment(name, "application/toml", text.as_bytes().to_vec()))
+        recorder.write(now, now, Entry::Attachment(name, "application/toml", text.as_bytes().to_vec()));
     };
     attach("pair.toml", &setup.pair_toml);
     attach("rig.toml", &setup.profile.to_toml());
