@@ -5,12 +5,16 @@
 
 mod common;
 
-use std::{collections::BTreeMap, io::Cursor};
+use std::{collections::BTreeMap, io::Cursor, path::Path};
 
 use common::{SMALL, messages, read, write};
 use gearmodel::Direction;
 use prost::Message;
-use riglog::{Completeness, LogError, LogReader, LogWriter, Record, info, proto::AngleBatch, read_runs, recover};
+use riglog::{
+    Completeness, LogError, LogReader, LogWriter, Record, info,
+    proto::{self, AngleBatch, Phase, RigState, Timestamp},
+    read_runs, recover,
+};
 
 #[test]
 fn everything_comes_back() {
@@ -89,6 +93,51 @@ fn info_says_what_is_in_the_log() {
     assert_eq!(info.channels.iter().map(|channel| channel.messages).sum::<u64>(), statistics.messages);
     assert!((info.duration_s - 6.7).abs() < 0.2, "{}", info.duration_s);
     assert!(info.completeness.is_complete());
+}
+
+/// A log with one run of two batches, the second at `second_ns`.
+fn two_batches(path: &Path, second_ns: u64) {
+    let mut log = LogWriter::create(path, common::options()).unwrap();
+    let state = |phase: Phase, at_ns| RigState {
+        timestamp: Some(Timestamp::from_ns(at_ns)),
+        phase: phase.into(),
+        direction: proto::Direction::Ccw.into(),
+        ..Default::default()
+    };
+    let batch = |first_sample, t0_ns| AngleBatch {
+        first_sample,
+        t0_ns,
+        dt_ns: 10,
+        input_delta: vec![0, 1],
+        output_delta: vec![0, 1],
+        ..Default::default()
+    };
+    log.angles(1, 1000, &batch(0, 1000)).unwrap();
+    log.angles(2, second_ns, &batch(2, second_ns)).unwrap();
+    // The states stand behind the samples that they are about.
+    log.state(3, 1010, &state(Phase::Record, 1010)).unwrap();
+    log.state(4, 1030, &state(Phase::Stopping, 1030)).unwrap();
+    log.finish().unwrap();
+}
+
+#[test]
+fn without_encoders_runs_are_counted_but_give_no_angles() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.mcap");
+    two_batches(&path, 1020);
+    let info = info(&path).unwrap();
+    assert_eq!((info.runs.len(), info.runs[0].samples, info.runs[0].revolutions), (1, 2, None));
+    let text = read_runs(&path).unwrap_err().to_string();
+    assert!(text.contains("rig.encoders") && text.contains("a.mcap"), "{text}");
+}
+
+#[test]
+fn time_that_runs_backwards_is_an_error_with_both_times() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.mcap");
+    two_batches(&path, 990);
+    let text = info(&path).unwrap_err().to_string();
+    assert!(text.contains("1010 ns") && text.contains("990 ns") && text.contains("sample 2"), "{text}");
 }
 
 #[test]

@@ -20,7 +20,9 @@ pub struct WriterOptions {
 impl WriterOptions {
     /// The project's policy: chunks of 100 ms or 1 MiB, synced every second.
     ///
-    /// Level 1 is zstd's fastest that still packs the deltas of angles entropy-coded.
+    /// zstd level 1: of the levels tried by `examples/throughput.rs` on counts of an elliptic pair it is the first that
+    /// codes the deltas by their entropy (2.05 B a sample against 3.03 at level −5), at 20 M samples/s, of which a rig
+    /// needs a thousandth; level 3 saves another 2 %.
     pub fn new(library: impl Into<String>) -> Self {
         Self {
             library: library.into(),

@@ -1,7 +1,7 @@
 //! The writer of a rig log.
 
 use std::{
-    fs::{File, OpenOptions, TryLockError},
+    fs::{File, OpenOptions},
     io,
     path::Path,
     time::{Duration, Instant},
@@ -52,7 +52,7 @@ impl LogWriter {
     /// Creates the file, locks it, and hands header, schemas and channels to the operating system.
     ///
     /// # Errors
-    /// The file exists, another process holds it, or the operating system refuses.
+    /// The file exists, or the operating system refuses.
     pub fn create(path: impl AsRef<Path>, options: WriterOptions) -> Result<Self, LogError> {
         let path = path.as_ref();
         let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|source| {
@@ -62,7 +62,8 @@ impl LogWriter {
                 LogError::io("create", path)(source)
             }
         })?;
-        lock(&file, path)?;
+        // The file is ours by its creation; a recovery that looks into the directory right now lets go at once.
+        file.lock().map_err(LogError::io("lock", path))?;
         let for_sync = file.try_clone().map_err(LogError::io("open", path))?;
         sync_directory_of(path);
         Self::on(path, Box::new(file), move || for_sync.sync_data(), options).inspect_err(|_| {
@@ -345,14 +346,6 @@ fn sync_directory_of(path: &Path) {
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
     if let Ok(directory) = File::open(parent.unwrap_or(Path::new("."))) {
         let _ = directory.sync_all();
-    }
-}
-
-fn lock(file: &File, path: &Path) -> Result<(), LogError> {
-    match file.try_lock() {
-        Ok(()) => Ok(()),
-        Err(TryLockError::WouldBlock) => Err(LogError::Locked { path: path.to_owned() }),
-        Err(TryLockError::Error(source)) => Err(LogError::io("lock", path)(source)),
     }
 }
 
