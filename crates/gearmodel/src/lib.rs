@@ -22,6 +22,7 @@ mod flank;
 mod free;
 mod geometry_error;
 pub mod increment;
+pub mod loaded;
 pub mod measure;
 mod model;
 mod outline;

@@ -114,7 +114,14 @@ impl GearPair {
     }
 
     /// Points of a flank from the end of the rack's straight part, d = −h_a m/(sin α cos α), to the tip.
-    fn flank_points(&self, gear: Gear, tooth: i64, side: Direction, tip: &Tip, count: usize) -> Vec<[f64; 2]> {
+    pub(crate) fn flank_points(
+        &self,
+        gear: Gear,
+        tooth: i64,
+        side: Direction,
+        tip: &Tip,
+        count: usize,
+    ) -> Vec<[f64; 2]> {
         let (sin, cos) = self.pressure_angle_rad().sin_cos();
         let start = -self.addendum() * self.module_mm() / (sin * cos);
         (0..count)
@@ -133,7 +140,7 @@ impl GearPair {
     }
 
     /// Points of a fillet from the root to the flank, the ends left to their neighbours.
-    fn fillet_points(&self, gear: Gear, tooth: i64, side: Direction, count: usize) -> Vec<[f64; 2]> {
+    pub(crate) fn fillet_points(&self, gear: Gear, tooth: i64, side: Direction, count: usize) -> Vec<[f64; 2]> {
         let sin = self.pressure_angle_rad().sin();
         let rising = rising(gear, side);
         let outward = if gear == Gear::Driver { 1.0 } else { -1.0 };

@@ -68,6 +68,16 @@ pub enum ContactError {
         /// Sense.
         direction: Direction,
     },
+    /// A load that is no load.
+    #[error(
+        "load {load_nm} N.m on the driven shaft is outside 0 to {limit_nm:e} N.m: the sense is the direction's, the load is positive"
+    )]
+    Load {
+        /// Load given, N·m.
+        load_nm: f64,
+        /// Largest load accepted, N·m.
+        limit_nm: f64,
+    },
     /// The angle is not a finite number.
     #[error("theta1 is {theta1_rad}: a finite angle in rad is needed")]
     NotFinite {
@@ -87,6 +97,17 @@ pub struct Contact {
     pub phase: f64,
     /// Tooth pairs within their tips, whether they carry or not.
     pub pairs_in_zone: u32,
+}
+
+/// A tooth pair within its tips, as if it alone touched.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PairTouch {
+    /// Driven angle, rad.
+    pub(crate) psi2_rad: f64,
+    /// Tooth of the driver.
+    pub(crate) tooth: i64,
+    /// Phase in pitches from the pitch point.
+    pub(crate) phase: f64,
 }
 
 /// A pair of rigid gears with displaced axes, ready for exact contact.
@@ -161,6 +182,31 @@ impl ContactModel {
     /// # Errors
     /// [`ContactError`] when no teeth touch there.
     pub fn contact(&self, theta1_rad: f64, direction: Direction) -> Result<Contact, ContactError> {
+        let mut carrying: Option<PairTouch> = None;
+        let mut pairs_in_zone = 0;
+        self.for_each_pair(theta1_rad, direction, |pair| {
+            pairs_in_zone += 1;
+            // The most advanced in the sense of motion carries; of equals the one nearest to the pitch point.
+            let ahead = |other: PairTouch| {
+                let lead_rad = direction.sign() * (pair.psi2_rad - other.psi2_rad);
+                lead_rad > 0.0 || (lead_rad == 0.0 && pair.phase.abs() < other.phase.abs())
+            };
+            if carrying.is_none_or(ahead) {
+                carrying = Some(pair);
+            }
+        })?;
+        let PairTouch { psi2_rad, tooth, phase } =
+            carrying.ok_or(ContactError::NoPairInZone { theta1_rad, direction })?;
+        Ok(Contact { te_rad: psi2_rad - self.pair.theta2(theta1_rad), tooth, phase, pairs_in_zone })
+    }
+
+    /// Visits every tooth pair within its tips, with the driven angle at which it alone would touch.
+    pub(crate) fn for_each_pair(
+        &self,
+        theta1_rad: f64,
+        direction: Direction,
+        mut visit: impl FnMut(PairTouch),
+    ) -> Result<(), ContactError> {
         if !self.pair.has_teeth() {
             return Err(ContactError::NoTeeth);
         }
@@ -168,11 +214,8 @@ impl ContactModel {
             return Err(ContactError::NotFinite { theta1_rad });
         }
         let shared = solve::touch(&self.pair, &self.displacement, theta1_rad, direction, 0.0, None)?;
-        let mut carrying: Option<(f64, i64, f64)> = None;
-        let mut pairs_in_zone = 0;
         for tooth in self.tips.candidates(&shared) {
             let Some(phase) = self.tips.phase_in_zone(&shared, tooth) else { continue };
-            pairs_in_zone += 1;
             let lead_mm = self.lead_mm(&shared, tooth, phase);
             let psi2_rad = if lead_mm == 0.0 {
                 shared.psi2_rad
@@ -180,17 +223,9 @@ impl ContactModel {
                 let start = Some(shared.theta_with_lead_rad(lead_mm));
                 solve::touch(&self.pair, &self.displacement, theta1_rad, direction, lead_mm, start)?.psi2_rad
             };
-            // The most advanced in the sense of motion carries; of equals the one nearest to the pitch point.
-            let ahead = |(other_rad, _, other_phase): (f64, i64, f64)| {
-                let lead_rad = direction.sign() * (psi2_rad - other_rad);
-                lead_rad > 0.0 || (lead_rad == 0.0 && phase.abs() < f64::abs(other_phase))
-            };
-            if carrying.is_none_or(ahead) {
-                carrying = Some((psi2_rad, tooth, phase));
-            }
+            visit(PairTouch { psi2_rad, tooth, phase });
         }
-        let (psi2_rad, tooth, phase) = carrying.ok_or(ContactError::NoPairInZone { theta1_rad, direction })?;
-        Ok(Contact { te_rad: psi2_rad - self.pair.theta2(theta1_rad), tooth, phase, pairs_in_zone })
+        Ok(())
     }
 
     /// TE at θ1 to first order, rad: the increment of eccentricities, displacement and designed backlash along the common
