@@ -67,7 +67,7 @@ pub fn predicted(model: &NominalModel, run: &RunTe) -> Curve {
 /// >>> te = 1e-4 * np.sin(theta1) + 1e-5 * np.sin(47 * theta1)
 /// >>> a = gm.analyse(gm.Recording(theta1 / 0.5, theta1, theta1 + te, 10.0, 4.8, "ccw"), pair)
 /// >>> a.te.shape
-/// (2, 720)
+/// (3, 720)
 /// >>> [f"{order.order}: {order.amplitude_rad * 1e6:.1f} urad" for order in a.spectrum[[0, 46]]]
 /// ['1: 100.0 urad', '47: 9.9 urad']
 #[pyfunction]

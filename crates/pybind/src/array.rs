@@ -97,6 +97,15 @@ pub fn array<'py>(field: &'static str, given: &Bound<'py, PyAny>) -> Result<Boun
     Ok(contiguous.cast_into::<PyArrayDyn<f64>>().map_err(PyErr::from)?)
 }
 
+/// The values of a 1-D array-like.
+pub fn column(field: &'static str, given: &Bound<'_, PyAny>) -> Result<Vec<f64>> {
+    let values = array(field, given)?;
+    if values.ndim() != 1 {
+        return Err(InputError::Dimensions { field, dimensions: values.ndim() }.into());
+    }
+    Ok(values.readonly().as_slice().map_err(PyErr::from)?.to_vec())
+}
+
 /// Fewest values worth a thread of their own: some milliseconds of work.
 const WORTH_A_THREAD: usize = 1 << 14;
 

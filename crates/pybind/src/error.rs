@@ -116,6 +116,14 @@ pub enum InputError {
         /// What numpy says.
         reason: String,
     },
+    /// A matrix or a single number where a list is needed.
+    #[error("{field} has {dimensions} dimensions: 1 is needed")]
+    Dimensions {
+        /// The argument.
+        field: &'static str,
+        /// Its dimensions.
+        dimensions: usize,
+    },
     /// There are two gears.
     #[error("gear {given} does not exist: write 1 (driver) or 2 (driven)")]
     Gear {
@@ -158,6 +166,28 @@ pub enum InputError {
         limit: usize,
         /// Bins a turn.
         bins: usize,
+    },
+    /// A tooth number below 0, which no gear has.
+    #[error("tooth {given} does not exist: teeth count from 0")]
+    Tooth {
+        /// The number given.
+        given: i64,
+    },
+    /// An objective that does not exist.
+    #[error("objective {given:?} is unknown: write \"backlash\", \"te_ccw\", \"te_cw\" or \"te_both\"")]
+    Objective {
+        /// The text given.
+        given: String,
+    },
+    /// A freedom of assembly that does not exist.
+    #[error(
+        "{gear} = {given}: write \"hub\" (turned by any angle), \"fixed\", or the steps a turn by which it can be indexed"
+    )]
+    Freedom {
+        /// The argument.
+        gear: &'static str,
+        /// What was given.
+        given: String,
     },
     /// The printed equations know no load.
     #[error(

@@ -1,19 +1,19 @@
 //! The native half of the Python package `gearmodel`: it converts and nothing else. Physics lives in the crate
 //! `gearmodel`, logs in `riglog`.
 //!
-//! A file per idea: `pair`, `errors`, `increment` (the model); `recording`, `log`, `analysis`, `backlash` (the measurement); `array` (what goes in
+//! A file per idea: `pair`, `errors` (the model); `recording`, `log`, `analysis`, `backlash` (the measurement); `array` (what goes in
 //! and out); `error` (the one place that makes exceptions).
 
-// Python's keyword arguments are Rust's positional ones.
-#![allow(clippy::too_many_arguments)]
+// Python's keyword arguments are Rust's positional ones, and come owned.
+#![allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
 
 mod analysis;
 mod array;
 mod backlash;
 mod error;
 mod errors;
-mod increment;
 mod log;
+mod outline;
 mod pair;
 mod recording;
 
@@ -33,7 +33,11 @@ mod _native {
     #[pymodule_export]
     use crate::log::{Event, Log, read_log};
     #[pymodule_export]
+    use crate::outline::{outline_dxf, outline_svg};
+    #[pymodule_export]
     use crate::pair::GearPair;
+    #[pymodule_export]
+    use crate::pair::phases::{PhaseValue, Phases};
     #[pymodule_export]
     use crate::recording::Recording;
 }

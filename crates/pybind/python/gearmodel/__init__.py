@@ -20,11 +20,14 @@ from ._native import (
     Log,
     LogError,
     MeasuredBacklash,
+    PhaseValue,
+    Phases,
     Recording,
     analyse,
     backlash_from,
     read_log,
 )
+from ._outline import Outline
 
 __all__ = [
     "Analysis",
@@ -35,6 +38,9 @@ __all__ = [
     "Log",
     "LogError",
     "MeasuredBacklash",
+    "Outline",
+    "PhaseValue",
+    "Phases",
     "Recording",
     "analyse",
     "backlash_from",

@@ -7,11 +7,14 @@ from ._native import (
     Log as Log,
     LogError as LogError,
     MeasuredBacklash as MeasuredBacklash,
+    PhaseValue as PhaseValue,
+    Phases as Phases,
     Recording as Recording,
     analyse as analyse,
     backlash_from as backlash_from,
     read_log as read_log,
 )
+from ._outline import Outline as Outline
 
 __all__ = [
     "Analysis",
@@ -22,6 +25,9 @@ __all__ = [
     "Log",
     "LogError",
     "MeasuredBacklash",
+    "Outline",
+    "PhaseValue",
+    "Phases",
     "Recording",
     "analyse",
     "backlash_from",

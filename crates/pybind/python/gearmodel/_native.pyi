@@ -7,6 +7,8 @@ from typing import Any, Literal, TypeAlias, final, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._outline import Outline
+
 _Array: TypeAlias = NDArray[np.float64]
 _Scalar: TypeAlias = float | np.floating[Any] | np.integer[Any]
 _Path: TypeAlias = str | os.PathLike[str]
@@ -26,7 +28,11 @@ __all__ = [
     "Log",
     "read_log",
     "GearPair",
+    "PhaseValue",
+    "Phases",
     "Recording",
+    "outline_dxf",
+    "outline_svg",
 ]
 
 class GeometryError(ValueError): ...
@@ -86,6 +92,62 @@ class GearPair:
         *,
         module_mm: float,
         teeth: _Teeth,
+        pressure_angle_deg: float = 20.0,
+        centre_distance_mm: float | None = None,
+        backlash_mm: float = 0.0,
+        face_width_mm: float = 30.0,
+        addendum: float = 1.0,
+        dedendum_clearance: float = 0.25,
+    ) -> GearPair: ...
+    @staticmethod
+    def lobed(
+        *,
+        module_mm: float,
+        teeth: _Teeth,
+        eccentricity: float,
+        lobes: tuple[int, int],
+        pressure_angle_deg: float = 20.0,
+        centre_distance_mm: float | None = None,
+        backlash_mm: float = 0.0,
+        face_width_mm: float = 30.0,
+        addendum: float = 1.0,
+        dedendum_clearance: float = 0.25,
+    ) -> GearPair: ...
+    @staticmethod
+    def fourier(
+        *,
+        module_mm: float,
+        teeth: _Teeth,
+        cosines: ArrayLike | None = None,
+        sines: ArrayLike | None = None,
+        pressure_angle_deg: float = 20.0,
+        centre_distance_mm: float | None = None,
+        backlash_mm: float = 0.0,
+        face_width_mm: float = 30.0,
+        addendum: float = 1.0,
+        dedendum_clearance: float = 0.25,
+    ) -> GearPair: ...
+    @staticmethod
+    def sampled(
+        *,
+        module_mm: float,
+        teeth: _Teeth,
+        theta1_rad: ArrayLike,
+        radius: ArrayLike,
+        pressure_angle_deg: float = 20.0,
+        centre_distance_mm: float | None = None,
+        backlash_mm: float = 0.0,
+        face_width_mm: float = 30.0,
+        addendum: float = 1.0,
+        dedendum_clearance: float = 0.25,
+    ) -> GearPair: ...
+    @staticmethod
+    def transmission(
+        *,
+        module_mm: float,
+        teeth: _Teeth,
+        cosines: ArrayLike | None = None,
+        sines: ArrayLike | None = None,
         pressure_angle_deg: float = 20.0,
         centre_distance_mm: float | None = None,
         backlash_mm: float = 0.0,
@@ -185,11 +247,49 @@ class GearPair:
         method: _Method = "common_normal",
         load_nm: float = 0.0,
     ) -> _Array: ...
+    def flank(self, gear: Literal[1, 2] = 1, tooth: int = 0, side: _Direction = "ccw", n: int = 64) -> _Array: ...
+    def outline(self, gear: Literal[1, 2] = 1, points_per_tooth: int = 40) -> Outline: ...
+    def to_dxf(self, path: _Path, gear: Literal[1, 2] = 1, points_per_tooth: int = 40) -> None: ...
+    def to_svg(self, path: _Path, gear: Literal[1, 2] = 1, points_per_tooth: int = 40) -> None: ...
+    def check_teeth(self) -> None: ...
+    def contact_ratio(self, direction: _Direction = "ccw") -> _Array: ...
+    def optimal_phases(
+        self,
+        errors: Errors | None = None,
+        objective: Literal["backlash", "te_ccw", "te_cw", "te_both"] = "backlash",
+        driver: Literal["hub", "fixed"] | int | None = None,
+        driven: Literal["hub", "fixed"] | int | None = None,
+    ) -> Phases: ...
     def __eq__(self, value: object, /) -> bool: ...
     def __ne__(self, value: object, /) -> bool: ...
     __hash__ = None  # type: ignore[assignment]
     def __reduce__(self) -> tuple[Any, tuple[str]]: ...
 
+@final
+class PhaseValue:
+    @property
+    def phi1_rad(self) -> float: ...
+    @property
+    def phi2_rad(self) -> float: ...
+    @property
+    def value_rad(self) -> float: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
+    __hash__ = None  # type: ignore[assignment]
+
+@final
+class Phases:
+    @property
+    def phi1_rad(self) -> float: ...
+    @property
+    def phi2_rad(self) -> float: ...
+    @property
+    def value_rad(self) -> float: ...
+    @property
+    def published(self) -> tuple[PhaseValue, PhaseValue]: ...
+
+def outline_dxf(points: NDArray[np.float64], layer: str) -> str: ...
+def outline_svg(points: NDArray[np.float64]) -> str: ...
 @final
 class Recording:
     def __new__(
