@@ -6,6 +6,7 @@
 //! [`sim`] is the rig as a simulation that answers the same bytes.
 
 pub mod analysis;
+pub mod chart;
 pub mod cli;
 pub mod clock;
 pub mod device;

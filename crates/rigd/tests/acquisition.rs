@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use gearmodel::Direction;
 use gearmodel::measure::RunConditions;
-use riglog::proto::Phase;
-use riglog::{LogReader, Record, WriterOptions};
 use rigd::analysis::Analysis;
 use rigd::clock::Clock;
 use rigd::device::CounterIdentity;
 use rigd::run::acquire::Acquisition;
 use rigd::run::recorder::{Entry, Recorder};
 use rigd::{pair, replay};
+use riglog::proto::Phase;
+use riglog::{LogReader, Record, WriterOptions};
 use tempfile::TempDir;
 use wire::counter_box::{SampleFlags, Samples};
 

@@ -3,19 +3,24 @@
 //! Its queue is long and, when full, makes the sender wait: nothing is dropped here. A write error is kept for the sequencer,
 //! which stops the rig; what comes after it is counted, not hidden.
 
+use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use riglog::proto::Level;
 use riglog::proto::{AngleBatch, Backlash, RigState, TransmissionError};
 use riglog::{EncoderMetadata, LogError, LogStatistics, LogWriter, RunMetadata, WriterOptions};
 
-/// Messages that may wait for the recorder: 80 s at 100 batches a second.
-const QUEUE: usize = 8192;
+/// Parcels that may wait for the recorder: half a minute and more at a parcel every [`PARCEL_AGE`].
+const QUEUE: usize = 4096;
+
+/// Entries travel in parcels, for waking a thread costs more than most entries; a parcel leaves at this age or size.
+const PARCEL_AGE: Duration = Duration::from_millis(8);
+const PARCEL: usize = 64;
 
 /// One entry of the log.
 #[derive(Debug)]
@@ -54,7 +59,9 @@ struct Shared {
 /// Handle of the recorder.
 pub struct Recorder {
     path: PathBuf,
-    queue: Option<SyncSender<Stamped>>,
+    queue: Option<SyncSender<Vec<Stamped>>>,
+    parcel: RefCell<Vec<Stamped>>,
+    sent: Cell<Instant>,
     thread: Option<JoinHandle<Result<LogStatistics, LogError>>>,
     shared: Arc<Shared>,
 }
@@ -66,14 +73,21 @@ impl Recorder {
     /// [`LogError`] when the file cannot be made.
     pub fn create(path: &Path, options: WriterOptions) -> Result<Self, LogError> {
         let writer = LogWriter::create(path, options)?;
-        let (queue, entries) = sync_channel(QUEUE);
+        let (queue, parcels) = sync_channel(QUEUE);
         let shared = Arc::new(Shared::default());
         let theirs = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("recorder".into())
-            .spawn(move || record(writer, &entries, &theirs))
+            .spawn(move || record(writer, &parcels, &theirs))
             .map_err(|source| LogError::Io { path: path.into(), action: "start the recorder's thread for", source })?;
-        Ok(Self { path: path.into(), queue: Some(queue), thread: Some(thread), shared })
+        Ok(Self {
+            path: path.into(),
+            queue: Some(queue),
+            parcel: RefCell::default(),
+            sent: Cell::new(Instant::now()),
+            thread: Some(thread),
+            shared,
+        })
     }
 
     /// Where the log is.
@@ -84,10 +98,20 @@ impl Recorder {
 
     /// Hands an entry to the recorder; waits when its queue is full.
     pub fn write(&self, log_time_ns: u64, publish_time_ns: u64, entry: Entry) {
-        let sent = self.queue.as_ref().map(|queue| queue.send(Stamped { log_time_ns, publish_time_ns, entry }));
-        if !matches!(sent, Some(Ok(()))) {
-            self.shared.unwritten.fetch_add(1, Ordering::Relaxed);
+        self.parcel.borrow_mut().push(Stamped { log_time_ns, publish_time_ns, entry });
+        if self.parcel.borrow().len() >= PARCEL || self.sent.get().elapsed() >= PARCEL_AGE {
+            self.send();
         }
+    }
+
+    fn send(&self) {
+        let parcel = self.parcel.replace(Vec::with_capacity(PARCEL));
+        let entries = parcel.len() as u64;
+        let sent = self.queue.as_ref().map(|queue| queue.send(parcel));
+        if !matches!(sent, Some(Ok(()))) {
+            self.shared.unwritten.fetch_add(entries, Ordering::Relaxed);
+        }
+        self.sent.set(Instant::now());
     }
 
     /// The write error, once.
@@ -107,6 +131,7 @@ impl Recorder {
     /// # Errors
     /// [`LogError`] when the end could not be written; the log is then readable up to its last whole chunk.
     pub fn finish(mut self) -> Result<LogStatistics, LogError> {
+        self.send();
         self.queue = None;
         match self.thread.take().map(JoinHandle::join) {
             Some(Ok(outcome)) => outcome,
@@ -117,22 +142,30 @@ impl Recorder {
     }
 }
 
-fn record(mut writer: LogWriter, entries: &Receiver<Stamped>, shared: &Shared) -> Result<LogStatistics, LogError> {
+fn record(mut writer: LogWriter, parcels: &Receiver<Vec<Stamped>>, shared: &Shared) -> Result<LogStatistics, LogError> {
     let mut failed = false;
     loop {
-        let outcome = match entries.recv_timeout(Duration::from_millis(50)) {
-            Ok(_) if failed => {
-                shared.unwritten.fetch_add(1, Ordering::Relaxed);
+        let outcome = match parcels.recv_timeout(Duration::from_millis(50)) {
+            Ok(parcel) if failed => {
+                shared.unwritten.fetch_add(parcel.len() as u64, Ordering::Relaxed);
                 continue;
             }
-            Ok(stamped) => write(&mut writer, stamped),
+            Ok(parcel) => {
+                let mut left = parcel.len() as u64;
+                let outcome = parcel.into_iter().try_for_each(|stamped| {
+                    write(&mut writer, stamped)?;
+                    left -= 1;
+                    Ok(())
+                });
+                shared.unwritten.fetch_add(left, Ordering::Relaxed);
+                outcome
+            }
             Err(RecvTimeoutError::Timeout) if failed => continue,
             Err(RecvTimeoutError::Timeout) => writer.tick(),
             Err(RecvTimeoutError::Disconnected) => return writer.finish(),
         };
         if let Err(error) = outcome {
             failed = true;
-            shared.unwritten.fetch_add(1, Ordering::Relaxed);
             *shared.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
         }
     }

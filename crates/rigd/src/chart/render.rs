@@ -1,0 +1,218 @@
+//! Draws a chart on a backend of plotters.
+
+use std::ops::Range;
+
+use plotters::backend::RGBPixel;
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::ValueFormatter;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+
+use super::{Axis, Chart, ChartError, Mark, Panel, Series, font};
+
+/// Width of a chart, px.
+const WIDTH_PX: u32 = 960;
+/// Height of a panel, px.
+const PANEL_PX: u32 = 320;
+/// Tallest panel of equal scales, px.
+const TALLEST_PX: u32 = 1280;
+/// Space around the axes: margin on each side, below for x labels, left for y labels, above for the title; px.
+const MARGIN_PX: u32 = 8;
+const X_LABELS_PX: u32 = 34;
+const Y_LABELS_PX: u32 = 64;
+const TITLE_PX: u32 = 30;
+
+/// Where a panel's axes are: pixels of the picture and the values at their ends.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// Left and right, px.
+    pub x_px: Range<i32>,
+    /// Top and bottom, px.
+    pub y_px: Range<i32>,
+    /// Values at left and right.
+    pub x: Range<f64>,
+    /// Values at bottom and top.
+    pub y: Range<f64>,
+}
+
+/// The chart as SVG and where its panels are; `None` for a panel without points.
+pub fn svg(chart: &Chart) -> Result<(String, Vec<Option<Frame>>), ChartError> {
+    let mut text = String::new();
+    let frames = draw(chart, SVGBackend::with_string(&mut text, size_px(chart)))?;
+    Ok((text, frames))
+}
+
+/// The chart as rows of RGB and its width and height in pixels.
+pub fn rgb(chart: &Chart) -> Result<(Vec<u8>, (u32, u32)), ChartError> {
+    let (width, height) = size_px(chart);
+    let mut pixels = vec![0; 3 * width as usize * height as usize];
+    let backend = BitMapBackend::<RGBPixel>::with_buffer_and_format(&mut pixels, (width, height))
+        .map_err(|error| ChartError::Draw(Box::new(error)))?;
+    draw(chart, backend)?;
+    Ok((pixels, (width, height)))
+}
+
+fn size_px(chart: &Chart) -> (u32, u32) {
+    (WIDTH_PX, chart.panels.iter().map(height_px).sum::<u32>().max(1))
+}
+
+/// A panel of equal scales is as tall as its points ask for.
+fn height_px(panel: &Panel) -> u32 {
+    match bounds(panel) {
+        Some((x, y)) if panel.equal_scale => {
+            let width = f64::from(WIDTH_PX - 2 * MARGIN_PX - Y_LABELS_PX);
+            let around = f64::from(2 * MARGIN_PX + X_LABELS_PX + TITLE_PX);
+            let height = around + width * (y.end - y.start) / (x.end - x.start);
+            // The clamp keeps it in the range of u32.
+            height.clamp(f64::from(PANEL_PX), f64::from(TALLEST_PX)) as u32
+        }
+        _ => PANEL_PX,
+    }
+}
+
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+fn draw<DB: DrawingBackend>(chart: &Chart, backend: DB) -> Result<Vec<Option<Frame>>, ChartError>
+where
+    DB::ErrorType: 'static,
+{
+    font::register();
+    let panels = || -> Result<_, Failure> {
+        let mut rest = backend.into_drawing_area();
+        rest.fill(&WHITE)?;
+        let mut frames = Vec::new();
+        for one in &chart.panels {
+            let (area, below) = rest.split_vertically(height_px(one));
+            frames.push(panel(&area, one)?);
+            rest = below;
+        }
+        rest.present()?;
+        Ok(frames)
+    };
+    panels().map_err(ChartError::Draw)
+}
+
+fn finite(series: &Series) -> impl Iterator<Item = (f64, f64)> {
+    series.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite())
+}
+
+/// Ranges of the axes with their margins; `None` without points.
+fn bounds(panel: &Panel) -> Option<(Range<f64>, Range<f64>)> {
+    let reach = |value: fn((f64, f64)) -> f64| {
+        let values = panel.series.iter().flat_map(finite).map(value);
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+    };
+    let (low, high) = reach(|(_, y)| y);
+    let (left, right) = if panel.x == Axis::Turn { (0.0, 360.0) } else { reach(|(x, _)| x) };
+    if low > high || left > right {
+        return None;
+    }
+    // A flat curve gets a range around it, wide enough that labels differ.
+    let margin = |low: f64, high: f64, share: f64| {
+        let span = high - low;
+        let flat = 1e-3 * high.abs().max(low.abs());
+        share * if span > 1e-9 * flat { span } else { flat.max(1.0) }
+    };
+    let y_margin = margin(low, high, 0.06);
+    let x_margin = match &panel.x {
+        Axis::Turn => 0.0,
+        Axis::Fitted(_) => margin(left, right, 0.02),
+    };
+    // Above the curves: room for the legend.
+    let headroom = if panel.equal_scale { 1.0 } else { 1.0 + panel.series.len() as f64 };
+    Some((left - x_margin..right + x_margin, low - y_margin..high + headroom * y_margin))
+}
+
+/// Widens one of the ranges so that a unit is as long on both axes.
+fn equalise((x, y): (Range<f64>, Range<f64>), (width, height): (u32, u32)) -> (Range<f64>, Range<f64>) {
+    let width = f64::from(width.saturating_sub(2 * MARGIN_PX + Y_LABELS_PX).max(1));
+    let height = f64::from(height.saturating_sub(2 * MARGIN_PX + X_LABELS_PX).max(1));
+    let a_pixel = ((x.end - x.start) / width).max((y.end - y.start) / height);
+    let widen = |range: Range<f64>, pixels: f64| {
+        let (middle, half) = (0.5 * (range.start + range.end), 0.5 * a_pixel * pixels);
+        middle - half..middle + half
+    };
+    (widen(x, width), widen(y, height))
+}
+
+/// Decimals that tell the labels of a range apart.
+fn decimals(range: &Range<f64>) -> usize {
+    // Six are enough for any quantity that is drawn.
+    (1.0 - (range.end - range.start).log10()).ceil().clamp(0.0, 6.0) as usize
+}
+
+fn panel<DB: DrawingBackend>(area: &DrawingArea<DB, Shift>, panel: &Panel) -> Result<Option<Frame>, Failure>
+where
+    DB::ErrorType: 'static,
+{
+    let Some(mut ranges) = bounds(panel) else { return Ok(None) };
+    let area = area.titled(&panel.title, (font::SANS, 18))?;
+    if panel.equal_scale {
+        ranges = equalise(ranges, area.dim_in_pixel());
+    }
+    let (x, y) = ranges;
+    let mut builder = ChartBuilder::on(&area);
+    builder.margin(MARGIN_PX).x_label_area_size(X_LABELS_PX).y_label_area_size(Y_LABELS_PX);
+    let (x_px, y_px) = match &panel.x {
+        Axis::Turn => {
+            let mut chart = builder.build_cartesian_2d(x.clone().step(45.0), y.clone())?;
+            fill(&mut chart, panel, "θ1 / °", (0, decimals(&y)))?
+        }
+        Axis::Fitted(label) => {
+            let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
+            fill(&mut chart, panel, label, (decimals(&x), decimals(&y)))?
+        }
+    };
+    Ok(Some(Frame { x_px, y_px, x, y }))
+}
+
+/// Draws axes, series and legend; gives back where the axes are, px.
+fn fill<DB, X>(
+    chart: &mut ChartContext<'_, DB, Cartesian2d<X, RangedCoordf64>>,
+    panel: &Panel,
+    x_label: &str,
+    (x_decimals, y_decimals): (usize, usize),
+) -> Result<(Range<i32>, Range<i32>), Failure>
+where
+    DB: DrawingBackend,
+    DB::ErrorType: 'static,
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    chart
+        .configure_mesh()
+        .x_desc(x_label)
+        .y_desc(panel.y_label.as_str())
+        .x_labels(9)
+        .x_label_formatter(&|value| format!("{value:.x_decimals$}"))
+        .y_label_formatter(&|value| format!("{value:.y_decimals$}"))
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(BLACK.mix(0.12))
+        .draw()?;
+    for series in &panel.series {
+        let colour = series.ink.colour();
+        let (every, size, style) = match series.mark {
+            Mark::Line => {
+                let style = colour.stroke_width(1);
+                chart
+                    .draw_series(LineSeries::new(finite(series), style))?
+                    .label(series.name.as_str())
+                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], style));
+                continue;
+            }
+            Mark::Rings(every) => (every.max(1), 3, colour.stroke_width(1)),
+            Mark::Dots => (1, 1, colour.filled()),
+        };
+        chart
+            .draw_series(finite(series).step_by(every).map(|point| Circle::new(point, size, style)))?
+            .label(series.name.as_str())
+            .legend(move |(x, y)| Circle::new((x + 10, y), 3, style));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperMiddle)
+        .label_font((font::SANS, 12))
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK.mix(0.2))
+        .draw()?;
+    Ok(chart.plotting_area().get_pixel_range())
+}
