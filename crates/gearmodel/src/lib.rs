@@ -30,6 +30,7 @@ mod pair;
 mod pair_file;
 pub mod phase;
 pub mod pitch_curve;
+pub mod sensitivity;
 mod spec;
 mod tip;
 mod tooth_check;

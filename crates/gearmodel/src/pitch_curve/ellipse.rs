@@ -24,6 +24,17 @@ pub struct Ellipse {
     arc_sines: Vec<f64>,
 }
 
+/// Derivatives of an elliptic pair by its eccentricity at fixed θ1, module and teeth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ByEccentricity {
+    /// ∂f/∂k, rad; ∂μ/∂k is −½ of it, because f = θ1 − 2μ.
+    pub(crate) theta2: f64,
+    /// ∂i21/∂k.
+    pub(crate) ratio: f64,
+    /// ∂ ln a/∂k: the perimeter stays π m Z.
+    pub(crate) relative_distance: f64,
+}
+
 /// θ + 2 atan(c sin θ/(1 − c cos θ)): the unwrapped Moebius map tan(y/2) = ((1 + c)/(1 − c)) tan(θ/2), |c| < 1.
 /// The inverse has −c. 1 − c cos θ > 0, so the arctangent never leaves its branch and the map is smooth on all reals.
 #[inline]
@@ -44,6 +55,27 @@ impl Ellipse {
     #[must_use]
     pub fn eccentricity(&self) -> f64 {
         self.k
+    }
+
+    /// Derivatives by k.
+    pub(crate) fn by_eccentricity(&self, theta1_rad: f64) -> ByEccentricity {
+        let k = self.k;
+        let (sin, cos) = theta1_rad.sin_cos();
+        let denominator = 1.0 - 2.0 * k * cos + k * k;
+        // perimeter = 2π · arc_mean · a with arc_mean = ½ mean √(1 − k² cos² E); its derivative is −½ k mean cos² E/√(…)
+        let nodes = 4 * (self.arc_sines.len() + 8);
+        let slope: f64 = (0..nodes)
+            .map(|j| {
+                let cos = (PI * j as f64 / nodes as f64).cos();
+                -0.5 * k * cos * cos / (1.0 - k * k * cos * cos).sqrt()
+            })
+            .sum::<f64>()
+            / nodes as f64;
+        ByEccentricity {
+            theta2: 2.0 * sin / denominator,
+            ratio: (-2.0 * k * denominator + 2.0 * (1.0 - k * k) * (cos - k)) / (denominator * denominator),
+            relative_distance: -slope / self.arc_mean,
+        }
     }
 
     /// Turns of the driven gear a turn of this driver at a centre distance of `d` closing distances:
