@@ -324,6 +324,26 @@ class Recording:
     def revolutions(self) -> float: ...
     @property
     def duration_s(self) -> float: ...
+    @staticmethod
+    def from_csv(
+        path: _Path,
+        *,
+        load_nm: ArrayLike | None = None,
+        speed_rpm: ArrayLike | None = None,
+        direction: Literal["ccw", "cw", "auto"] | None = None,
+        input_lines: int | None = None,
+        output_lines: int | None = None,
+    ) -> Recording: ...
+    @staticmethod
+    def from_parquet(
+        path: _Path,
+        *,
+        load_nm: ArrayLike | None = None,
+        speed_rpm: ArrayLike | None = None,
+        direction: Literal["ccw", "cw", "auto"] | None = None,
+        input_lines: int | None = None,
+        output_lines: int | None = None,
+    ) -> Recording: ...
     def split(self) -> list[Recording]: ...
     def __len__(self) -> int: ...
     def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, int | None]]: ...

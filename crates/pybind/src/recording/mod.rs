@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod split;
+mod table;
 
 use gearmodel::Direction;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
