@@ -28,9 +28,27 @@ const fn at(phase: Phase, after_ms: u64) -> Instance {
 const INSTANTS: [[Instance; 5]; 4] = [
     // While connecting, before any sample.
     [at(Phase::Idle, 0), at(Phase::Idle, 90), at(Phase::Idle, 230), at(Phase::Idle, 520), at(Phase::Homing, 0)],
-    [at(Phase::Homing, 130), at(Phase::Homing, 410), at(Phase::Homing, 890), at(Phase::Homing, 1340), at(Phase::Approach, 0)],
-    [at(Phase::Approach, 1210), at(Phase::Settle, 70), at(Phase::Settle, 760), at(Phase::Record, 0), at(Phase::Record, 60)],
-    [at(Phase::Record, 170), at(Phase::Record, 330), at(Phase::Record, 520), at(Phase::Record, 1010), at(Phase::Record, 1650)],
+    [
+        at(Phase::Homing, 130),
+        at(Phase::Homing, 410),
+        at(Phase::Homing, 890),
+        at(Phase::Homing, 1340),
+        at(Phase::Approach, 0),
+    ],
+    [
+        at(Phase::Approach, 1210),
+        at(Phase::Settle, 70),
+        at(Phase::Settle, 760),
+        at(Phase::Record, 0),
+        at(Phase::Record, 60),
+    ],
+    [
+        at(Phase::Record, 170),
+        at(Phase::Record, 330),
+        at(Phase::Record, 520),
+        at(Phase::Record, 1010),
+        at(Phase::Record, 1650),
+    ],
 ];
 
 /// What a kill left.
@@ -65,7 +83,11 @@ fn kill_at(instant: Instance, seed: u64) -> Left {
     for record in LogReader::open(&log).expect("a readable log") {
         match record.expect("whole records") {
             Record::Angles { log_time_ns, batch, .. } => {
-                assert!(next.is_none_or(|next| next == batch.first_sample), "a gap before sample {}", batch.first_sample);
+                assert!(
+                    next.is_none_or(|next| next == batch.first_sample),
+                    "a gap before sample {}",
+                    batch.first_sample
+                );
                 next = Some(batch.first_sample + batch.input_delta.len() as u64);
                 last_sample_ns = Some(log_time_ns);
                 messages += 1;
@@ -107,13 +129,17 @@ fn a_run_killed_at_20_instants_leaves_a_clean_prefix_that_the_next_run_finalises
 
     for left in &all {
         let next = rigd(left.run.home())
-            .args(["run", "--load", "5Nm", "--rpm", "30", "--revs", "1", "--direction", "ccw", "--rate", "1kHz", "--json", "--out"])
+            .args("run --load 5Nm --rpm 30 --revs 1 --direction ccw --rate 1kHz --json --out".split(' '))
             .arg(&left.run.out)
             .output()
             .expect("it runs");
         let said = String::from_utf8_lossy(&next.stderr);
         assert_eq!(next.status.code(), Some(0), "{said}");
-        assert!(said.contains("recovered") && said.contains(&format!("{} messages kept", left.messages)), "{:?}: {said}", left.instant);
+        assert!(
+            said.contains("recovered") && said.contains(&format!("{} messages kept", left.messages)),
+            "{:?}: {said}",
+            left.instant
+        );
         assert!(riglog::info(&left.log).expect("a readable log").completeness.is_complete(), "{:?}", left.instant);
     }
     if let Some(counts) = python_counts("whole", &logs) {
@@ -124,7 +150,8 @@ fn a_run_killed_at_20_instants_leaves_a_clean_prefix_that_the_next_run_finalises
 /// Watches the shafts by the encoders alone, for any word to the servo would feed its watchdog; returns when they stood still.
 fn standstill_by_encoders(profile: &Profile, seconds: f64) -> Instant {
     let counter = &profile.counter;
-    let address = Address { device: "counter", port: counter.port.clone(), baud: counter.baud, format: counter.format.clone() };
+    let address =
+        Address { device: "counter", port: counter.port.clone(), baud: counter.baud, format: counter.format.clone() };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
     runtime.block_on(async {
         let link = address.open().await.expect("the counter's port opens again");
@@ -165,7 +192,10 @@ fn a_servo_whose_master_was_killed_stops_within_lease_and_ramp() {
     // The drive's watchdog counts whole seconds; its ramp is given for 3000 rpm of the motor; the coupling rings out a little.
     let ramp_s = 30.0 * profile.servo.reduction / 3000.0 * profile.servo.decel_ms * 1e-3;
     let limit_s = profile.sequence.lease_s.ceil() + ramp_s + 0.5;
-    println!("standstill {stood:.2} s after the kill, limit {limit_s:.2} s (lease {} s, ramp {ramp_s} s)", profile.sequence.lease_s);
+    println!(
+        "standstill {stood:.2} s after the kill, limit {limit_s:.2} s (lease {} s, ramp {ramp_s} s)",
+        profile.sequence.lease_s
+    );
     assert!(stood <= limit_s, "{stood} s");
 
     let state = sim.servo().state();

@@ -266,8 +266,9 @@ impl Acquisition {
     /// Ends a run before its time: what was recorded stays, and the state says where it ends.
     pub fn abandon(&mut self) {
         if matches!(self.recording, Recording::Active { .. }) {
-            let end = self.latest.sample_ns + 1;
-            self.end_run(end, self.next_sample);
+            // Just past the last sample; the states that follow are dated alike, or they would end the run before it.
+            self.latest.sample_ns += 1;
+            self.end_run(self.latest.sample_ns, self.next_sample);
         }
         self.recording = Recording::Idle;
     }

@@ -2,6 +2,8 @@
 //! devices as another master sees them.
 #![allow(dead_code, reason = "each test takes its part")]
 
+pub mod line;
+
 use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
@@ -68,7 +70,10 @@ impl Drop for Process {
 /// Whether a process is at work; one that only waits to be reaped is not.
 pub fn lives(pid: Pid) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    stat.rsplit(')').next().and_then(|rest| rest.split_whitespace().next()).is_some_and(|state| state != "Z" && state != "X")
+    stat.rsplit(')')
+        .next()
+        .and_then(|rest| rest.split_whitespace().next())
+        .is_some_and(|state| state != "Z" && state != "X")
 }
 
 /// Processes that `parent` started.
@@ -205,7 +210,10 @@ impl Run {
     /// The log, once it is there.
     pub fn log(&self) -> Option<PathBuf> {
         let entries = std::fs::read_dir(&self.out).ok()?;
-        entries.flatten().map(|entry| entry.path()).find(|path| path.extension().is_some_and(|extension| extension == "mcap"))
+        entries
+            .flatten()
+            .map(|entry| entry.path())
+            .find(|path| path.extension().is_some_and(|extension| extension == "mcap"))
     }
 
     /// Waits for a phase in the growing log.
@@ -216,15 +224,24 @@ impl Run {
     /// Phase and direction of the last state in the log.
     pub fn last_state(&self) -> Option<(Phase, i32)> {
         let reader = LogReader::open(self.log()?).ok()?;
-        reader.flatten().filter_map(|record| if let Record::State { state, .. } = record { Some((state.phase(), state.direction)) } else { None }).last()
+        reader
+            .flatten()
+            .filter_map(|record| {
+                if let Record::State { state, .. } = record { Some((state.phase(), state.direction)) } else { None }
+            })
+            .last()
     }
 
     pub fn wait(&mut self, seconds: f64) -> Ended {
         let begun = Instant::now();
         let status = self.process.wait(seconds);
         let text = |name: &str| std::fs::read_to_string(self.home.path().join(name)).expect("its output");
-        let ended =
-            Ended { code: status.code(), stdout: text("stdout"), stderr: text("stderr"), seconds: begun.elapsed().as_secs_f64() };
+        let ended = Ended {
+            code: status.code(),
+            stdout: text("stdout"),
+            stderr: text("stderr"),
+            seconds: begun.elapsed().as_secs_f64(),
+        };
         assert!(!ended.stderr.contains("panicked"), "{}", ended.stderr);
         ended
     }
@@ -243,7 +260,11 @@ pub fn python_counts(reader: &str, logs: &[PathBuf]) -> Option<Vec<u64>> {
         println!("skipped: RIG_PYTHON names no Python with the package mcap, so only our own reader was asked");
         return None;
     };
-    let output = Command::new(python).args(["-c", include_str!("read_logs.py"), reader]).args(logs).output().expect("Python runs");
+    let output = Command::new(python)
+        .args(["-c", include_str!("read_logs.py"), reader])
+        .args(logs)
+        .output()
+        .expect("Python runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     Some(String::from_utf8_lossy(&output.stdout).lines().map(|line| line.parse().expect("a number")).collect())
 }
