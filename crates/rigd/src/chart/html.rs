@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use plotters::style::Color as _;
 use serde_json::json;
 
 use super::{Axis, Chart, ChartError, Mark, render};

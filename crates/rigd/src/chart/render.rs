@@ -167,14 +167,14 @@ where
 }
 
 /// Draws axes, series and legend; gives back where the axes are, px.
-fn fill<DB, X>(
-    chart: &mut ChartContext<'_, DB, Cartesian2d<X, RangedCoordf64>>,
+fn fill<'a, DB, X>(
+    chart: &mut ChartContext<'a, DB, Cartesian2d<X, RangedCoordf64>>,
     panel: &Panel,
     x_label: &str,
     (x_decimals, y_decimals): (usize, usize),
 ) -> Result<(Range<i32>, Range<i32>), Failure>
 where
-    DB: DrawingBackend,
+    DB: DrawingBackend + 'a,
     DB::ErrorType: 'static,
     X: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {

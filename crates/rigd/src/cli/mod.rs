@@ -2,6 +2,7 @@
 
 mod directions;
 mod info;
+mod model;
 mod replay;
 mod run;
 mod sim;
@@ -52,6 +53,8 @@ enum Command {
     Replay(replay::Args),
     /// Say what is in a log
     Info(info::Args),
+    /// Ask the model of a gear pair: TE, backlash, drawings, checks
+    Model(Box<model::Args>),
     /// Start the simulated rig in real time, on ports of its own
     Sim(sim::Args),
     /// End a run from another terminal, as Ctrl-C does
@@ -74,6 +77,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::main(&args),
         Command::Replay(args) => replay::main(&args),
         Command::Info(args) => info::main(&args),
+        Command::Model(args) => model::main(&args),
         Command::Sim(args) => sim::main(&args),
         Command::Stop(args) => stop::main(&args),
     };

@@ -1,0 +1,98 @@
+//! How TE and backlash are computed: one function of θ1 whatever the method.
+
+use gearmodel::contact::ContactModel;
+use gearmodel::increment::published;
+use gearmodel::{Direction, NominalModel};
+
+use super::error::ModelError;
+use super::source::Loaded;
+
+/// How TE is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Method {
+    /// Increment along the common normal, first order in the errors
+    #[value(name = "common_normal", alias = "common-normal")]
+    CommonNormal,
+    /// Exact contact of rack-generated flanks
+    Exact,
+    /// The printed equations of the source document, kept for comparison
+    Published,
+}
+
+impl Method {
+    /// The name in options, tables and JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CommonNormal => "common_normal",
+            Self::Exact => "exact",
+            Self::Published => "published",
+        }
+    }
+}
+
+/// A method, ready for one pair and load.
+pub struct Predictor<'a> {
+    method: Method,
+    name: &'a str,
+    model: &'a NominalModel,
+    contact: Option<ContactModel>,
+    load_nm: f64,
+}
+
+impl<'a> Predictor<'a> {
+    /// Prepares a method.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the method cannot take the load or the pair.
+    pub fn new(pair: &'a Loaded, method: Method, load_nm: f64) -> Result<Self, ModelError> {
+        let model = &pair.model;
+        if method == Method::Published && load_nm != 0.0 {
+            return Err(ModelError::PublishedLoad { load_nm });
+        }
+        let contact = match method {
+            Method::Exact => Some(
+                ContactModel::new(model.pair.clone(), &model.errors)
+                    .map_err(|source| ModelError::Geometry { pair: pair.name.clone(), source })?,
+            ),
+            _ => None,
+        };
+        Ok(Self { method, name: &pair.name, model, contact, load_nm })
+    }
+
+    /// The method.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// TE at θ1, rad at the driven shaft. With the exact method the compliances' wind-up is added to the rigid contact.
+    ///
+    /// # Errors
+    /// [`ModelError::Contact`] where no teeth touch.
+    pub fn te_rad(&self, theta1_rad: f64, direction: Direction) -> Result<f64, ModelError> {
+        match &self.contact {
+            Some(contact) => {
+                let rigid_rad = contact
+                    .te_rad(theta1_rad, direction)
+                    .map_err(|source| ModelError::Contact { pair: self.name.to_owned(), source })?;
+                Ok(rigid_rad + self.model.windup_rad(&self.model.pair.at(theta1_rad), direction, self.load_nm))
+            }
+            None if self.method == Method::Published => {
+                Ok(published::te_rad(&self.model.pair, &self.model.errors, theta1_rad, direction))
+            }
+            None => Ok(self.model.te_rad(theta1_rad, direction, self.load_nm)),
+        }
+    }
+
+    /// Backlash at θ1, rad at the driven shaft: TE_cw − TE_ccw; of the printed equations their periodic part alone.
+    ///
+    /// # Errors
+    /// [`ModelError::Contact`] where no teeth touch.
+    pub fn backlash_rad(&self, theta1_rad: f64) -> Result<f64, ModelError> {
+        match self.method {
+            Method::Published => Ok(published::backlash_rad(&self.model.pair, &self.model.errors, theta1_rad)),
+            _ => Ok(self.te_rad(theta1_rad, Direction::Cw)? - self.te_rad(theta1_rad, Direction::Ccw)?),
+        }
+    }
+}
