@@ -213,7 +213,8 @@ impl Summary {
             backend: origin.backend,
             samples: runs.iter().map(|run| run.samples).sum(),
             losses: origin.losses,
-            duration_s: runs.iter().map(|run| run.duration_s).sum(),
+            // Not `sum`, which is -0 for no runs.
+            duration_s: runs.iter().fold(0.0, |total, run| total + run.duration_s),
             te,
             backlash: backlashes.iter().rev().find(|figures| Some(figures.load_nm) == last_load).cloned(),
             te_hash: analysis.te_hash(),

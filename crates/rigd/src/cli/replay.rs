@@ -58,7 +58,10 @@ fn run(args: &Args) -> Result<Exit, Box<dyn std::error::Error>> {
         }
     };
     let mut analysis = Analysis::new(model);
-    let replayed = replay::replay(&args.logs, &mut analysis, args.speed.0)?;
+    let mut replayed = replay::replay(&args.logs, &mut analysis, args.speed.0)?;
+    if analysis.runs().is_empty() {
+        replayed.incomplete.push("no recorded run: TE and backlash need a stretch of phase RECORD".into());
+    }
     let summary = Summary::of(
         &analysis,
         Origin {
