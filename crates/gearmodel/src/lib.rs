@@ -32,7 +32,9 @@ pub mod phase;
 pub mod pitch_curve;
 pub mod sensitivity;
 mod spec;
+pub mod sweep;
 mod tip;
+pub mod tolerance;
 mod tooth_check;
 
 pub use direction::{Direction, ParseDirectionError};

@@ -123,12 +123,17 @@ impl GearPair {
         count: usize,
     ) -> Vec<[f64; 2]> {
         let (sin, cos) = self.pressure_angle_rad().sin_cos();
-        let start = -self.addendum() * self.module_mm() / (sin * cos);
+        let rising = rising(gear, side);
+        let origin_mm = self.flank_origin_mm(gear, tooth, side);
+        let start_mm = -self.addendum() * self.module_mm() / (sin * cos);
+        // Equal steps of the rolling angle need the inverse of the arc length at the ends alone.
+        let from_rad = self.theta1_at_arc_length(origin_mm + rising * start_mm);
+        let to_rad = self.theta1_at_arc_length(origin_mm + rising * tip.reach_mm);
         (0..count)
             .map(|n| {
                 let share = n as f64 / (count - 1) as f64;
-                let along = start + share * (tip.reach_mm - start);
-                self.flank_point(gear, tooth, side, rising(gear, side) * along).0
+                let roll = self.roll(from_rad + share * (to_rad - from_rad));
+                self.to_body(gear, &roll, self.rack_contact(&roll, roll.arc_mm - origin_mm, side))
             })
             .collect()
     }
