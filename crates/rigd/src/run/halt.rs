@@ -49,9 +49,11 @@ pub enum Halt {
     BrakeTripped,
     /// The encoders fell silent.
     #[error(
-        "no encoder sample for {silent_ms:.0} ms (limit {limit_ms:.0} ms, limits.encoder_silence_ms); check the counter's cable and power"
+        "counter on {port}: no encoder sample for {silent_ms:.0} ms (limit {limit_ms:.0} ms, limits.encoder_silence_ms); check its cable and power"
     )]
     EncodersSilent {
+        /// The counter's port.
+        port: String,
         /// How long.
         silent_ms: f64,
         /// The limit.

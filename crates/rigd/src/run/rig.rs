@@ -133,7 +133,8 @@ impl Rig {
     /// Reads both drives and writes the state.
     async fn observe(&mut self) -> Result<(), Halt> {
         let servo = self.servo.status().await?;
-        let brake = self.brake.status().await?;
+        let lease_s = self.profile.sequence.lease_s;
+        let brake = keep_lease(self.servo.as_mut(), lease_s, self.brake.status()).await?;
         {
             let mut rig = self.acquisition.borrow_mut();
             rig.status.servo_alarm = servo.alarm;
@@ -164,7 +165,8 @@ impl Rig {
             let silent_ms = self.clock.now_ns().saturating_sub(rig.latest.arrived_ns) as f64 * 1e-6;
             let limit_ms = self.profile.limits.encoder_silence_ms;
             if rig.latest.arrived_ns > 0 && silent_ms > limit_ms {
-                return Err(Halt::EncodersSilent { silent_ms, limit_ms });
+                let port = self.profile.counter.port.clone();
+                return Err(Halt::EncodersSilent { port, silent_ms, limit_ms });
             }
         }
         let limits = &self.profile.limits;
@@ -278,7 +280,8 @@ impl Rig {
     pub async fn set_load(&mut self, load_nm: f64) -> Result<(), Halt> {
         self.acquisition.borrow_mut().status.load_setpoint_nm = load_nm;
         let current = self.profile.brake.current_a(load_nm).unwrap_or(0.0);
-        Ok(self.brake.set_current_a(current).await?)
+        let lease_s = self.profile.sequence.lease_s;
+        Ok(keep_lease(self.servo.as_mut(), lease_s, self.brake.set_current_a(current)).await?)
     }
 
     /// Time that the drive needs from one driver speed to another, and a little, s.
@@ -311,7 +314,8 @@ impl Rig {
             troubles.push("the servo does not answer and the shaft may turn: the brake keeps its load; press the emergency stop and switch the drive off by hand".into());
         } else {
             self.acquisition.borrow_mut().status.load_setpoint_nm = 0.0;
-            if let Err(error) = self.brake.release().await {
+            let lease_s = self.profile.sequence.lease_s;
+            if let Err(error) = keep_lease(self.servo.as_mut(), lease_s, self.brake.release()).await {
                 troubles.push(format!("brake was not switched off: {error}; switch it off at its panel"));
             }
         }
@@ -363,6 +367,23 @@ impl Rig {
                 troubles.push(format!("standstill could not be confirmed: {reason}"));
                 rig.event(Level::Error, "stop", "standstill could not be confirmed".into());
                 return false;
+            }
+        }
+    }
+}
+
+/// Waits for `work` on another device and renews the servo's lease meanwhile: a device that no longer answers takes its
+/// time-outs, and the servo shall be stopped by its ramp, not by its watchdog.
+async fn keep_lease<T>(servo: &mut dyn Servo, lease_s: f64, work: impl Future<Output = T>) -> T {
+    let mut work = std::pin::pin!(work);
+    loop {
+        // Half of the lease is left for the transaction that renews it.
+        match tokio::time::timeout(Duration::from_secs_f64(0.5 * lease_s), &mut work).await {
+            Ok(done) => return done,
+            Err(_) => {
+                if let Err(error) = servo.status().await {
+                    tracing::debug!("while another device is awaited: {error}");
+                }
             }
         }
     }
