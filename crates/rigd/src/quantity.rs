@@ -53,6 +53,19 @@ pub const RATE: Kind = Kind {
     exclusive: true,
 };
 
+/// Angle; base unit rad.
+pub const ANGLE: Kind = Kind {
+    name: "angle",
+    units: &[
+        Unit { names: &["rad"], factor: 1.0 },
+        Unit { names: &["deg", "°"], factor: std::f64::consts::PI / 180.0 },
+    ],
+    example: "30deg",
+    bare: false,
+    minimum: f64::MIN,
+    exclusive: false,
+};
+
 /// Why a quantity could not be read.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum QuantityError {

@@ -22,6 +22,9 @@ const X_LABELS_PX: u32 = 34;
 const Y_LABELS_PX: u32 = 64;
 const TITLE_PX: u32 = 30;
 
+/// Pixels of a PNG for each of the sizes above: screens show more than 96 dots an inch.
+const PNG_SCALE: u32 = 2;
+
 /// Where a panel's axes are: pixels of the picture and the values at their ends.
 #[derive(Debug, Clone)]
 pub struct Frame {
@@ -38,17 +41,18 @@ pub struct Frame {
 /// The chart as SVG and where its panels are; `None` for a panel without points.
 pub fn svg(chart: &Chart) -> Result<(String, Vec<Option<Frame>>), ChartError> {
     let mut text = String::new();
-    let frames = draw(chart, SVGBackend::with_string(&mut text, size_px(chart)))?;
+    let frames = draw(chart, SVGBackend::with_string(&mut text, size_px(chart)), 1)?;
     Ok((text, frames))
 }
 
 /// The chart as rows of RGB and its width and height in pixels.
 pub fn rgb(chart: &Chart) -> Result<(Vec<u8>, (u32, u32)), ChartError> {
     let (width, height) = size_px(chart);
+    let (width, height) = (PNG_SCALE * width, PNG_SCALE * height);
     let mut pixels = vec![0; 3 * width as usize * height as usize];
     let backend = BitMapBackend::<RGBPixel>::with_buffer_and_format(&mut pixels, (width, height))
         .map_err(|error| ChartError::Draw(Box::new(error)))?;
-    draw(chart, backend)?;
+    draw(chart, backend, PNG_SCALE)?;
     Ok((pixels, (width, height)))
 }
 
@@ -72,7 +76,7 @@ fn height_px(panel: &Panel) -> u32 {
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-fn draw<DB: DrawingBackend>(chart: &Chart, backend: DB) -> Result<Vec<Option<Frame>>, ChartError>
+fn draw<DB: DrawingBackend>(chart: &Chart, backend: DB, scale: u32) -> Result<Vec<Option<Frame>>, ChartError>
 where
     DB::ErrorType: 'static,
 {
@@ -82,8 +86,8 @@ where
         rest.fill(&WHITE)?;
         let mut frames = Vec::new();
         for one in &chart.panels {
-            let (area, below) = rest.split_vertically(height_px(one));
-            frames.push(panel(&area, one)?);
+            let (area, below) = rest.split_vertically(scale * height_px(one));
+            frames.push(panel(&area, one, scale)?);
             rest = below;
         }
         rest.present()?;
@@ -124,9 +128,9 @@ fn bounds(panel: &Panel) -> Option<(Range<f64>, Range<f64>)> {
 }
 
 /// Widens one of the ranges so that a unit is as long on both axes.
-fn equalise((x, y): (Range<f64>, Range<f64>), (width, height): (u32, u32)) -> (Range<f64>, Range<f64>) {
-    let width = f64::from(width.saturating_sub(2 * MARGIN_PX + Y_LABELS_PX).max(1));
-    let height = f64::from(height.saturating_sub(2 * MARGIN_PX + X_LABELS_PX).max(1));
+fn equalise((x, y): (Range<f64>, Range<f64>), (width, height): (u32, u32), scale: u32) -> (Range<f64>, Range<f64>) {
+    let width = f64::from(width.saturating_sub(scale * (2 * MARGIN_PX + Y_LABELS_PX)).max(1));
+    let height = f64::from(height.saturating_sub(scale * (2 * MARGIN_PX + X_LABELS_PX)).max(1));
     let a_pixel = ((x.end - x.start) / width).max((y.end - y.start) / height);
     let widen = |range: Range<f64>, pixels: f64| {
         let (middle, half) = (0.5 * (range.start + range.end), 0.5 * a_pixel * pixels);
@@ -141,26 +145,26 @@ fn decimals(range: &Range<f64>) -> usize {
     (1.0 - (range.end - range.start).log10()).ceil().clamp(0.0, 6.0) as usize
 }
 
-fn panel<DB: DrawingBackend>(area: &DrawingArea<DB, Shift>, panel: &Panel) -> Result<Option<Frame>, Failure>
+fn panel<DB: DrawingBackend>(area: &DrawingArea<DB, Shift>, panel: &Panel, scale: u32) -> Result<Option<Frame>, Failure>
 where
     DB::ErrorType: 'static,
 {
     let Some(mut ranges) = bounds(panel) else { return Ok(None) };
-    let area = area.titled(&panel.title, (font::SANS, 18))?;
+    let area = area.titled(&panel.title, (font::SANS, 18 * scale))?;
     if panel.equal_scale {
-        ranges = equalise(ranges, area.dim_in_pixel());
+        ranges = equalise(ranges, area.dim_in_pixel(), scale);
     }
     let (x, y) = ranges;
     let mut builder = ChartBuilder::on(&area);
-    builder.margin(MARGIN_PX).x_label_area_size(X_LABELS_PX).y_label_area_size(Y_LABELS_PX);
+    builder.margin(scale * MARGIN_PX).x_label_area_size(scale * X_LABELS_PX).y_label_area_size(scale * Y_LABELS_PX);
     let (x_px, y_px) = match &panel.x {
         Axis::Turn => {
             let mut chart = builder.build_cartesian_2d(x.clone().step(45.0), y.clone())?;
-            fill(&mut chart, panel, "θ1 / °", (0, decimals(&y)))?
+            fill(&mut chart, panel, "θ1 / °", (0, decimals(&y)), scale)?
         }
         Axis::Fitted(label) => {
             let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
-            fill(&mut chart, panel, label, (decimals(&x), decimals(&y)))?
+            fill(&mut chart, panel, label, (decimals(&x), decimals(&y)), scale)?
         }
     };
     Ok(Some(Frame { x_px, y_px, x, y }))
@@ -172,14 +176,22 @@ fn fill<'a, DB, X>(
     panel: &Panel,
     x_label: &str,
     (x_decimals, y_decimals): (usize, usize),
+    scale: u32,
 ) -> Result<(Range<i32>, Range<i32>), Failure>
 where
     DB: DrawingBackend + 'a,
     DB::ErrorType: 'static,
     X: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
+    // Plotters takes lengths of marks as i32.
+    let px = scale as i32;
+    let text = (font::SANS, 12 * scale);
     chart
         .configure_mesh()
+        .label_style(text)
+        .axis_desc_style(text)
+        .set_all_tick_mark_size(5 * scale)
+        .axis_style(BLACK.stroke_width(scale))
         .x_desc(x_label)
         .y_desc(panel.y_label.as_str())
         .x_labels(9)
@@ -192,25 +204,27 @@ where
         let colour = series.ink.colour();
         let (every, size, style) = match series.mark {
             Mark::Line => {
-                let style = colour.stroke_width(1);
+                let style = colour.stroke_width(scale);
                 chart
                     .draw_series(LineSeries::new(finite(series), style))?
                     .label(series.name.as_str())
-                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], style));
+                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 20 * px, y)], style));
                 continue;
             }
-            Mark::Rings(every) => (every.max(1), 3, colour.stroke_width(1)),
-            Mark::Dots => (1, 1, colour.filled()),
+            Mark::Rings(every) => (every.max(1), 3 * px, colour.stroke_width(scale)),
+            Mark::Dots => (1, px, colour.filled()),
         };
         chart
             .draw_series(finite(series).step_by(every).map(|point| Circle::new(point, size, style)))?
             .label(series.name.as_str())
-            .legend(move |(x, y)| Circle::new((x + 10, y), 3, style));
+            .legend(move |(x, y)| Circle::new((x + 10 * px, y), 3 * px, style));
     }
     chart
         .configure_series_labels()
         .position(SeriesLabelPosition::UpperMiddle)
-        .label_font((font::SANS, 12))
+        .label_font(text)
+        .legend_area_size(30 * px)
+        .margin(10 * scale)
         .background_style(WHITE.mix(0.8))
         .border_style(BLACK.mix(0.2))
         .draw()?;

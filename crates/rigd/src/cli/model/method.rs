@@ -2,6 +2,7 @@
 
 use gearmodel::contact::ContactModel;
 use gearmodel::increment::published;
+use gearmodel::loaded::{LoadedModel, Material, Supports};
 use gearmodel::{Direction, NominalModel};
 
 use super::error::ModelError;
@@ -15,6 +16,8 @@ pub enum Method {
     CommonNormal,
     /// Exact contact of rack-generated flanks
     Exact,
+    /// Exact contact of elastic steel teeth that share the load, with the documented shafts
+    Loaded,
     /// The printed equations of the source document, kept for comparison
     Published,
 }
@@ -26,9 +29,16 @@ impl Method {
         match self {
             Self::CommonNormal => "common_normal",
             Self::Exact => "exact",
+            Self::Loaded => "loaded",
             Self::Published => "published",
         }
     }
+}
+
+/// Teeth in contact.
+enum Contact {
+    Rigid(Box<ContactModel>),
+    Elastic(Box<LoadedModel>),
 }
 
 /// A method, ready for one pair and load.
@@ -36,7 +46,7 @@ pub struct Predictor<'a> {
     method: Method,
     name: &'a str,
     model: &'a NominalModel,
-    contact: Option<ContactModel>,
+    contact: Option<Contact>,
     load_nm: f64,
 }
 
@@ -50,12 +60,20 @@ impl<'a> Predictor<'a> {
         if method == Method::Published && load_nm != 0.0 {
             return Err(ModelError::PublishedLoad { load_nm });
         }
+        let geometry = |source| ModelError::Geometry { pair: pair.name.clone(), source };
+        let rigid = || ContactModel::new(model.pair.clone(), &model.errors).map_err(geometry);
         let contact = match method {
-            Method::Exact => Some(
-                ContactModel::new(model.pair.clone(), &model.errors)
-                    .map_err(|source| ModelError::Geometry { pair: pair.name.clone(), source })?,
-            ),
-            _ => None,
+            Method::Exact => Some(Contact::Rigid(Box::new(rigid()?))),
+            Method::Loaded => {
+                let supports = Supports {
+                    shaft_compliance_output_rad_per_nm: model.errors.shaft_compliance_output_rad_per_nm,
+                    shaft_compliance_input_rad_per_nm: model.errors.shaft_compliance_input_rad_per_nm,
+                    ..Supports::default()
+                };
+                let elastic = LoadedModel::new(rigid()?, supports, Material::default()).map_err(geometry)?;
+                Some(Contact::Elastic(Box::new(elastic)))
+            }
+            Method::CommonNormal | Method::Published => None,
         };
         Ok(Self { method, name: &pair.name, model, contact, load_nm })
     }
@@ -71,13 +89,14 @@ impl<'a> Predictor<'a> {
     /// # Errors
     /// [`ModelError::Contact`] where no teeth touch.
     pub fn te_rad(&self, theta1_rad: f64, direction: Direction) -> Result<f64, ModelError> {
+        let missing = |source| ModelError::Contact { pair: self.name.to_owned(), source };
         match &self.contact {
-            Some(contact) => {
-                let rigid_rad = contact
-                    .te_rad(theta1_rad, direction)
-                    .map_err(|source| ModelError::Contact { pair: self.name.to_owned(), source })?;
+            Some(Contact::Rigid(contact)) => {
+                let rigid_rad = contact.te_rad(theta1_rad, direction).map_err(missing)?;
                 Ok(rigid_rad + self.model.windup_rad(&self.model.pair.at(theta1_rad), direction, self.load_nm))
             }
+            // The teeth's own compliance stands in for the documented mesh compliance.
+            Some(Contact::Elastic(contact)) => contact.te_rad(theta1_rad, direction, self.load_nm).map_err(missing),
             None if self.method == Method::Published => {
                 Ok(published::te_rad(&self.model.pair, &self.model.errors, theta1_rad, direction))
             }

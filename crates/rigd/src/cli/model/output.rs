@@ -62,6 +62,12 @@ pub enum OutputError {
         /// The other.
         second: &'static str,
     },
+    /// Two drawings for one stdout.
+    #[error("{option} - : a drawing holds one gear; choose it with --gear 1 or --gear 2, or give a file's name")]
+    TwoGears {
+        /// The option.
+        option: &'static str,
+    },
     /// This build has no Parquet.
     #[error(
         "--parquet {}: this build of rigd cannot write Parquet; build it with `cargo build --release -p rigd --features parquet`, or use --csv",
@@ -102,8 +108,10 @@ pub enum OutputError {
         source: std::io::Error,
     },
     /// The table cannot be written.
-    #[error("--csv {}: {source}", path.display())]
+    #[error("{option} {}: {source}", path.display())]
     Csv {
+        /// The option that asked for it.
+        option: &'static str,
         /// The file.
         path: PathBuf,
         /// Why.
@@ -116,7 +124,9 @@ impl OutputError {
     #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
-            Self::TwoOnStdout { .. } | Self::NoParquet { .. } | Self::ParquetOnStdout => Exit::BadInput,
+            Self::TwoOnStdout { .. } | Self::TwoGears { .. } | Self::NoParquet { .. } | Self::ParquetOnStdout => {
+                Exit::BadInput
+            }
             Self::Chart { source: ChartError::Format { .. }, .. } => Exit::BadInput,
             _ => Exit::Failed,
         }
@@ -170,7 +180,11 @@ impl Output {
         if let Some(path) = &self.csv {
             quiet |= is_stdout(path);
             let mut text = Vec::new();
-            report.table.write_csv(&mut text).map_err(|source| OutputError::Csv { path: path.clone(), source })?;
+            report.table.write_csv(&mut text).map_err(|source| OutputError::Csv {
+                option: "--csv",
+                path: path.clone(),
+                source,
+            })?;
             write("--csv", path, &text)?;
         }
         #[cfg(feature = "parquet")]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gearmodel::NominalModel;
+use gearmodel::{NominalModel, PairFile};
 use serde_json::{Value, json};
 use thiserror::Error;
 use toml::Table;
@@ -20,15 +20,15 @@ pub struct Source {
     set: Vec<(String, toml::Value)>,
 }
 
-/// A pair with its text.
+/// A pair as it was read.
 #[derive(Debug, Clone)]
 pub struct Loaded {
     /// Where it came from, for headings and errors.
     pub name: String,
     /// The model.
     pub model: NominalModel,
-    /// The text in force, as TOML.
-    pub toml: String,
+    /// What is in force, as its file says it.
+    pub file: PairFile,
 }
 
 /// Why a value cannot be set.
@@ -94,23 +94,24 @@ impl Source {
     /// # Errors
     /// [`SourceError`] names the file or the setting, the key and the limit.
     pub fn load(&self) -> Result<Loaded, SourceError> {
-        let (text, model) = pair::load(self.pair.as_deref())?;
-        let name = self.pair.as_ref().map_or_else(|| "the built-in pair".to_owned(), |path| path.display().to_string());
-        if self.set.is_empty() {
-            return Ok(Loaded { name, model, toml: text });
-        }
-        // The text was a pair, so it is TOML.
-        let mut table: Table = text.parse().unwrap_or_default();
-        for (key, value) in &self.set {
-            assign(&mut table, key, value.clone());
-        }
-        let settings: Vec<_> = self.set.iter().map(|(key, value)| format!("{key}={value}")).collect();
-        let settings = settings.join(" ");
-        let text = table.to_string();
+        let (mut text, mut model) = pair::load(self.pair.as_deref())?;
+        let mut name =
+            self.pair.as_ref().map_or_else(|| "the built-in pair".to_owned(), |path| path.display().to_string());
         let path = self.pair.as_deref().unwrap_or(Path::new("(built in)"));
-        let model =
-            pair::parse(&text, path).map_err(|source| SourceError::Set { settings: settings.clone(), source })?;
-        Ok(Loaded { name: format!("{name} with {settings}"), model, toml: text })
+        if !self.set.is_empty() {
+            // The text was a pair, so it is TOML.
+            let mut table: Table = text.parse().unwrap_or_default();
+            for (key, value) in &self.set {
+                assign(&mut table, key, value.clone());
+            }
+            let settings: Vec<_> = self.set.iter().map(|(key, value)| format!("{key}={value}")).collect();
+            let settings = settings.join(" ");
+            text = table.to_string();
+            name = format!("{name} with {settings}");
+            model = pair::parse(&text, path).map_err(|source| SourceError::Set { settings, source })?;
+        }
+        let file = PairFile::parse(&text).map_err(|source| PairError::Text { path: path.into(), source })?;
+        Ok(Loaded { name, model, file })
     }
 }
 

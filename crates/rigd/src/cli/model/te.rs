@@ -57,7 +57,9 @@ pub fn run(args: &Args) -> Result<(), ModelError> {
         let predictor = Predictor::new(&pair, *method, load_nm)?;
         for direction in args.direction.list() {
             let start_rad = match method {
-                Method::CommonNormal | Method::Exact if args.relative_to_start => predictor.te_rad(0.0, direction)?,
+                // Its start terms are part of the printed form.
+                Method::Published => 0.0,
+                _ if args.relative_to_start => predictor.te_rad(0.0, direction)?,
                 _ => 0.0,
             };
             let values_rad = theta1_rad
