@@ -4,8 +4,8 @@ use gearmodel::measure::{AngleGrid, Curve, Order, RunConditions, RunFigures, Run
 use gearmodel::{Direction, GearPair as ModelPair, NominalModel};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
+use crate::array::record_array;
 use crate::error::{InputError, Result};
 use crate::pair::GearPair;
 use crate::recording::{OneSense, Recording};
@@ -116,10 +116,9 @@ fn spectrum(py: Python<'_>, orders: &[Order]) -> Result<Py<PyAny>> {
     let number = PyArray1::from_iter(py, orders.iter().map(|order| i64::from(order.order)));
     let amplitude = PyArray1::from_iter(py, orders.iter().map(|order| order.amplitude_rad));
     let phase = PyArray1::from_iter(py, orders.iter().map(|order| order.phase_rad));
-    let keywords = PyDict::new(py);
-    keywords.set_item("names", ("order", "amplitude_rad", "phase_rad"))?;
-    let columns = (number, amplitude, phase);
-    Ok(py.import("numpy")?.getattr("rec")?.call_method("fromarrays", (columns,), Some(&keywords))?.unbind())
+    let columns =
+        vec![("order", number.into_any()), ("amplitude_rad", amplitude.into_any()), ("phase_rad", phase.into_any())];
+    record_array(py, columns)
 }
 
 #[pymethods]

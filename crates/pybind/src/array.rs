@@ -6,7 +6,7 @@ use std::thread;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::{PyFloat, PyInt};
+use pyo3::types::{PyDict, PyFloat, PyInt};
 
 use crate::error::{InputError, Raised, Result};
 
@@ -104,6 +104,15 @@ pub fn column(field: &'static str, given: &Bound<'_, PyAny>) -> Result<Vec<f64>>
         return Err(InputError::Dimensions { field, dimensions: values.ndim() }.into());
     }
     Ok(values.readonly().as_slice().map_err(PyErr::from)?.to_vec())
+}
+
+/// A numpy record array of named columns.
+pub fn record_array<'py>(py: Python<'py>, columns: Vec<(&str, Bound<'py, PyAny>)>) -> Result<Py<PyAny>> {
+    let (names, columns): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
+    let keywords = PyDict::new(py);
+    keywords.set_item("names", names)?;
+    let records = py.import("numpy")?.getattr("rec")?.call_method("fromarrays", (columns,), Some(&keywords))?;
+    Ok(records.unbind())
 }
 
 /// Fewest values worth a thread of their own: some milliseconds of work.

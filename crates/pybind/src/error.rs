@@ -54,7 +54,7 @@ impl From<gearmodel::contact::ContactError> for Raised {
     fn from(error: gearmodel::contact::ContactError) -> Self {
         use gearmodel::contact::ContactError;
         Self(match error {
-            ContactError::NotFinite { .. } => PyValueError::new_err(error.to_string()),
+            ContactError::NotFinite { .. } | ContactError::Load { .. } => PyValueError::new_err(error.to_string()),
             _ => GeometryError::new_err(error.to_string()),
         })
     }
@@ -88,6 +88,16 @@ impl From<riglog::LogError> for Raised {
 impl From<gearmodel::measure::MeasureError> for Raised {
     fn from(error: gearmodel::measure::MeasureError) -> Self {
         Self(PyValueError::new_err(error.to_string()))
+    }
+}
+
+impl From<gearmodel::tolerance::ToleranceError> for Raised {
+    fn from(error: gearmodel::tolerance::ToleranceError) -> Self {
+        use gearmodel::tolerance::ToleranceError;
+        match error {
+            ToleranceError::Range(range) => range.into(),
+            _ => Self(PyValueError::new_err(error.to_string())),
+        }
     }
 }
 
@@ -197,6 +207,48 @@ pub enum InputError {
     PublishedLoad {
         /// The load given.
         load_nm: f64,
+    },
+    /// The printed equations know eccentricities alone.
+    #[error(
+        "tooth_errors or displacement_mm with method \"published\": the printed equations know eccentricities alone; take \
+         \"common_normal\" or \"exact\""
+    )]
+    PublishedErrors,
+    /// A parameter that does not exist.
+    #[error("parameter {given:?} is unknown: write one of {known}")]
+    Parameter {
+        /// The text given.
+        given: String,
+        /// The parameters there are.
+        known: String,
+    },
+    /// A figure that does not exist.
+    #[error(
+        "of = {given:?} is unknown: write \"te_pp\", \"te_rms\", \"te_mean\", \"backlash_pp\" or \"backlash_mean\""
+    )]
+    Figure {
+        /// The text given.
+        given: String,
+    },
+    /// A method that sweeps do not have.
+    #[error("method {given:?} is unknown to sweeps: write \"common_normal\" or \"exact\"")]
+    SweptMethod {
+        /// The text given.
+        given: String,
+    },
+    /// A pair that has no eccentricity to vary.
+    #[error("a pair of kind {kind:?} cannot be swept: take an elliptic one, or two equal circular gears")]
+    SweptKind {
+        /// The kind of pair.
+        kind: &'static str,
+    },
+    /// A parameter of another kind of pair.
+    #[error("parameter {given:?} does not belong to a pair of kind {kind:?}")]
+    ForeignParameter {
+        /// The parameter.
+        given: &'static str,
+        /// The kind of pair.
+        kind: &'static str,
     },
     /// A load that is not a number.
     #[error("load_nm is {load_nm}: a finite torque in N.m is needed")]

@@ -1,7 +1,7 @@
 //! The native half of the Python package `gearmodel`: it converts and nothing else. Physics lives in the crate
 //! `gearmodel`, logs in `riglog`.
 //!
-//! A file per idea: `pair`, `errors` (the model); `recording`, `log`, `analysis`, `backlash` (the measurement); `array` (what goes in
+//! A file per idea: `pair`, `errors`, `tooth_errors`, `outline`, `study` (the model); `recording`, `log`, `analysis`, `backlash` (the measurement); `array` (what goes in
 //! and out); `error` (the one place that makes exceptions).
 
 // Python's keyword arguments are Rust's positional ones, and come owned.
@@ -16,6 +16,8 @@ mod log;
 mod outline;
 mod pair;
 mod recording;
+mod study;
+mod tooth_errors;
 
 use pyo3::prelude::*;
 
@@ -37,7 +39,13 @@ mod _native {
     #[pymodule_export]
     use crate::pair::GearPair;
     #[pymodule_export]
+    use crate::pair::loaded::LoadedPair;
+    #[pymodule_export]
     use crate::pair::phases::{PhaseValue, Phases};
     #[pymodule_export]
     use crate::recording::Recording;
+    #[pymodule_export]
+    use crate::study::sweep;
+    #[pymodule_export]
+    use crate::tooth_errors::{Profile, ToothDamage, ToothErrors};
 }

@@ -11,6 +11,7 @@ use pyo3::types::{PyDict, PyList};
 use riglog::proto::{self, Level};
 use riglog::{Completeness, EncoderMetadata, LogReader, Record, RunMetadata};
 
+use crate::array::record_array;
 use crate::error::Result;
 use crate::pair::GearPair;
 use crate::recording::Recording;
@@ -210,15 +211,6 @@ pub fn read_log(py: Python<'_>, path: PathBuf) -> Result<Log> {
         pair_text: head.pair_text,
         path,
     })
-}
-
-/// A numpy record array of named columns.
-fn record_array<'py>(py: Python<'py>, columns: Vec<(&str, Bound<'py, PyAny>)>) -> Result<Py<PyAny>> {
-    let (names, columns): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
-    let keywords = PyDict::new(py);
-    keywords.set_item("names", names)?;
-    let records = py.import("numpy")?.getattr("rec")?.call_method("fromarrays", (columns,), Some(&keywords))?;
-    Ok(records.unbind())
 }
 
 fn times<'py, T>(

@@ -17,17 +17,23 @@ from ._native import (
     Event,
     GearPair,
     GeometryError,
+    LoadedPair,
     Log,
     LogError,
     MeasuredBacklash,
     PhaseValue,
     Phases,
+    Profile,
     Recording,
+    ToothDamage,
+    ToothErrors,
     analyse,
     backlash_from,
     read_log,
+    sweep,
 )
 from ._outline import Outline
+from ._study import SweepTable, Tolerance, ToleranceFigure
 
 __all__ = [
     "Analysis",
@@ -35,19 +41,27 @@ __all__ = [
     "Event",
     "GearPair",
     "GeometryError",
+    "LoadedPair",
     "Log",
     "LogError",
     "MeasuredBacklash",
     "Outline",
     "PhaseValue",
     "Phases",
+    "Profile",
     "Recording",
+    "SweepTable",
+    "Tolerance",
+    "ToleranceFigure",
+    "ToothDamage",
+    "ToothErrors",
     "analyse",
     "backlash_from",
     "read_log",
+    "sweep",
 ]
 
 # Functions of the native half say where users find them, as its classes do by themselves.
-for _function in (analyse, backlash_from, read_log):
+for _function in (analyse, backlash_from, read_log, sweep):
     _function.__module__ = __name__
 del _function

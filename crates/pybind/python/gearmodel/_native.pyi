@@ -1,13 +1,14 @@
 """Types of the native half; the documentation is in the docstrings of the module itself."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._outline import Outline
+from ._study import SweepTable, Tolerance
 
 _Array: TypeAlias = NDArray[np.float64]
 _Scalar: TypeAlias = float | np.floating[Any] | np.integer[Any]
@@ -31,6 +32,11 @@ __all__ = [
     "PhaseValue",
     "Phases",
     "Recording",
+    "LoadedPair",
+    "Profile",
+    "ToothDamage",
+    "ToothErrors",
+    "sweep",
     "outline_dxf",
     "outline_svg",
 ]
@@ -220,6 +226,9 @@ class GearPair:
         method: _Method = "common_normal",
         load_nm: float = 0.0,
         relative_to_start: bool = False,
+        *,
+        tooth_errors: ToothErrors | None = None,
+        displacement_mm: tuple[float, float] | None = None,
     ) -> float: ...
     @overload
     def transmission_error(
@@ -230,6 +239,9 @@ class GearPair:
         method: _Method = "common_normal",
         load_nm: float = 0.0,
         relative_to_start: bool = False,
+        *,
+        tooth_errors: ToothErrors | None = None,
+        displacement_mm: tuple[float, float] | None = None,
     ) -> _Array: ...
     @overload
     def backlash(
@@ -238,6 +250,9 @@ class GearPair:
         errors: Errors | None = None,
         method: _Method = "common_normal",
         load_nm: float = 0.0,
+        *,
+        tooth_errors: ToothErrors | None = None,
+        displacement_mm: tuple[float, float] | None = None,
     ) -> float: ...
     @overload
     def backlash(
@@ -246,7 +261,52 @@ class GearPair:
         errors: Errors | None = None,
         method: _Method = "common_normal",
         load_nm: float = 0.0,
+        *,
+        tooth_errors: ToothErrors | None = None,
+        displacement_mm: tuple[float, float] | None = None,
     ) -> _Array: ...
+    @overload
+    def te_derivative(
+        self,
+        theta1: _Scalar,
+        parameter: str,
+        errors: Errors | None = None,
+        direction: _Direction = "ccw",
+        load_nm: float = 0.0,
+    ) -> float: ...
+    @overload
+    def te_derivative(
+        self,
+        theta1: ArrayLike,
+        parameter: str,
+        errors: Errors | None = None,
+        direction: _Direction = "ccw",
+        load_nm: float = 0.0,
+    ) -> _Array: ...
+    def tolerance(
+        self,
+        errors: Errors | None = None,
+        sigma: Mapping[str, float] | None = None,
+        n: int = 100_000,
+        seed: int = 0,
+        *,
+        uniform: Mapping[str, float] | None = None,
+        load_nm: float = 0.0,
+        angles: int = 720,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> Tolerance: ...
+    def loaded(
+        self,
+        errors: Errors | None = None,
+        *,
+        tooth_errors: ToothErrors | None = None,
+        displacement_mm: tuple[float, float] | None = None,
+        bearing_compliance_mm_per_n: float = 0.0,
+        bearing_clearance_mm: float = 0.0,
+        youngs_modulus_n_per_mm2: float = 206_000.0,
+        poisson: float = 0.3,
+        stiffness_correction: float = 0.8,
+    ) -> LoadedPair: ...
     def flank(self, gear: Literal[1, 2] = 1, tooth: int = 0, side: _Direction = "ccw", n: int = 64) -> _Array: ...
     def outline(self, gear: Literal[1, 2] = 1, points_per_tooth: int = 40) -> Outline: ...
     def to_dxf(self, path: _Path, gear: Literal[1, 2] = 1, points_per_tooth: int = 40) -> None: ...
@@ -288,6 +348,84 @@ class Phases:
     @property
     def published(self) -> tuple[PhaseValue, PhaseValue]: ...
 
+@final
+class LoadedPair:
+    @overload
+    def transmission_error(self, theta1: _Scalar, load_nm: float, direction: _Direction = "ccw") -> float: ...
+    @overload
+    def transmission_error(self, theta1: ArrayLike, load_nm: float, direction: _Direction = "ccw") -> _Array: ...
+    @overload
+    def backlash(self, theta1: _Scalar, load_nm: float) -> float: ...
+    @overload
+    def backlash(self, theta1: ArrayLike, load_nm: float) -> _Array: ...
+    def mesh(self, theta1: ArrayLike, load_nm: float, direction: _Direction = "ccw") -> np.recarray[Any, Any]: ...
+    @overload
+    def mesh_stiffness_n_per_mm_um(self, theta1: _Scalar, load_nm: float, direction: _Direction = "ccw") -> float: ...
+    @overload
+    def mesh_stiffness_n_per_mm_um(self, theta1: ArrayLike, load_nm: float, direction: _Direction = "ccw") -> _Array: ...
+
+@final
+class Profile:
+    def __new__(
+        cls, *, slope_mm: float = 0.0, crown_mm: float = 0.0, waves: Sequence[tuple[float, float]] | None = None
+    ) -> Profile: ...
+    @property
+    def slope_mm(self) -> float: ...
+    @property
+    def crown_mm(self) -> float: ...
+    @property
+    def waves(self) -> list[tuple[float, float]]: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
+    __hash__ = None  # type: ignore[assignment]
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
+
+@final
+class ToothDamage:
+    def __new__(cls, tooth: int, depth_mm: float, width: float, flank: _Direction = "ccw") -> ToothDamage: ...
+    @property
+    def tooth(self) -> int: ...
+    @property
+    def depth_mm(self) -> float: ...
+    @property
+    def width(self) -> float: ...
+    @property
+    def flank(self) -> _Direction: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
+    __hash__ = None  # type: ignore[assignment]
+    def __getnewargs__(self) -> tuple[int, float, float, str]: ...
+
+@final
+class ToothErrors:
+    def __new__(
+        cls,
+        *,
+        driver_ccw_mm: ArrayLike | None = None,
+        driver_cw_mm: ArrayLike | None = None,
+        driven_ccw_mm: ArrayLike | None = None,
+        driven_cw_mm: ArrayLike | None = None,
+        profile_ccw: Profile | None = None,
+        profile_cw: Profile | None = None,
+        damage: Sequence[ToothDamage] | None = None,
+    ) -> ToothErrors: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
+    __hash__ = None  # type: ignore[assignment]
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
+
+def sweep(
+    pair: GearPair,
+    over: Mapping[str, ArrayLike],
+    of: Literal["te_pp", "te_rms", "te_mean", "backlash_pp", "backlash_mean"] = "te_pp",
+    *,
+    errors: Errors | None = None,
+    direction: _Direction = "ccw",
+    method: Literal["common_normal", "exact"] = "common_normal",
+    load_nm: float = 0.0,
+    angles: int = 720,
+    progress: Callable[[int, int], object] | None = None,
+) -> SweepTable: ...
 def outline_dxf(points: NDArray[np.float64], layer: str) -> str: ...
 def outline_svg(points: NDArray[np.float64]) -> str: ...
 @final

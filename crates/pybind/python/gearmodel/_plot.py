@@ -9,7 +9,7 @@ import numpy as np
 from ._extras import require
 
 if TYPE_CHECKING:
-    from . import Analysis, MeasuredBacklash
+    from . import Analysis, MeasuredBacklash, SweepTable
 
 URAD = 1e6
 DEGREES = "driver angle theta1 / deg"
@@ -48,4 +48,19 @@ def backlash(b: MeasuredBacklash) -> Any:
     axes.plot(degrees, URAD * b.predicted, "--", label="predicted")
     axes.set(xlabel=DEGREES, ylabel="backlash / urad", xlim=(0, 360))
     axes.legend()
+    return figure
+
+
+def sweep(table: SweepTable) -> Any:
+    """A figure over the first parameter, a line for each combination of the others."""
+    figure, axes = _figure(1)
+    (name, first), *others = table.axes.items()
+    lines = table.values.reshape(len(first), -1)
+    grids = [grid.ravel() for grid in np.meshgrid(*(values for _, values in others), indexing="ij")]
+    for n in range(lines.shape[1]):
+        at = [f"{other} = {grid[n]:g}" for (other, _), grid in zip(others, grids, strict=True)]
+        axes.plot(first, URAD * lines[:, n], label=", ".join(at))
+    axes.set(xlabel=name, ylabel=f"{table.of} / urad")
+    if others and lines.shape[1] <= 12:
+        axes.legend()
     return figure

@@ -3,6 +3,7 @@
 mod drawing;
 mod increment;
 mod kinematics;
+pub mod loaded;
 mod make;
 pub mod phases;
 
@@ -45,7 +46,7 @@ impl GearPair {
     }
 
     /// The model with the pair's own errors, or with those given.
-    fn model_with(&self, errors: Option<&Errors>) -> NominalModel {
+    pub fn model_with(&self, errors: Option<&Errors>) -> NominalModel {
         // The constructor of Errors has checked them.
         NominalModel { pair: self.model.pair.clone(), errors: errors.map_or(self.model.errors, |errors| errors.0) }
     }
