@@ -44,7 +44,7 @@ fn interrupt(run: &Run) {
 /// Waits for a phase, in a sense where it matters.
 fn phase(wanted: Phase, sense: Option<Direction>) -> impl FnOnce(&Run) {
     move |run| {
-        run.await_phase(|phase, direction| phase == wanted && sense.is_none_or(|sense| direction == sense as i32))
+        run.await_phase(|phase, direction| phase == wanted && sense.is_none_or(|sense| direction == sense as i32));
     }
 }
 

@@ -319,10 +319,14 @@ impl Rig {
                 troubles.push(format!("brake was not switched off: {error}; switch it off at its panel"));
             }
         }
-        if let Err(error) = self.servo.set_enabled(false).await
-            && !servo_lost
-        {
-            troubles.push(format!("servo was not switched off: {error}; switch it off by hand"));
+        match self.servo.set_enabled(false).await {
+            Err(error) if !servo_lost => {
+                troubles.push(format!("servo was not switched off: {error}; switch it off by hand"));
+            }
+            Err(_) if still && self.moving => troubles.push(
+                "the shafts stand still, but the servo does not answer and may be on: switch the drive off by hand before you touch the rig".into(),
+            ),
+            _ => {}
         }
         if let Some(mut stream) = self.stream.take() {
             stream.end.notify_one();

@@ -2,6 +2,7 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read as _, Write as _};
+use std::os::fd::OwnedFd;
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,21 +10,24 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use nix::fcntl::OFlag;
 use nix::libc::{O_NOCTTY, O_NONBLOCK};
-use nix::pty::openpty;
+use nix::pty::{grantpt, posix_openpt, ptsname_r, unlockpt};
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
-use nix::unistd::ttyname;
 
-/// A raw pseudo-terminal: the device's end, the daemon's end held open, and the daemon's path.
+/// A raw pseudo-terminal: the device's end, the daemon's end held open, and the daemon's path. No process started later
+/// inherits an end, or pulling the cable would hang up nothing.
 fn terminal() -> (File, File, PathBuf) {
-    let ends = openpty(None, None).expect("a pseudo-terminal");
-    let mut settings = tcgetattr(&ends.slave).expect("settings");
+    let flags = OFlag::O_RDWR | OFlag::O_NOCTTY | OFlag::O_NONBLOCK | OFlag::O_CLOEXEC;
+    let device = posix_openpt(flags).expect("a pseudo-terminal");
+    grantpt(&device).expect("its other end is ours");
+    unlockpt(&device).expect("its other end opens");
+    let path = PathBuf::from(ptsname_r(&device).expect("its path"));
+    let daemon = OpenOptions::new().read(true).write(true).custom_flags(O_NOCTTY).open(&path).expect("its other end");
+    let mut settings = tcgetattr(&daemon).expect("settings");
     cfmakeraw(&mut settings);
-    tcsetattr(&ends.slave, SetArg::TCSANOW, &settings).expect("raw");
-    fcntl(&ends.master, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).expect("not blocking");
-    let path = ttyname(&ends.slave).expect("its path");
-    (File::from(ends.master), File::from(ends.slave), path)
+    tcsetattr(&daemon, SetArg::TCSANOW, &settings).expect("raw");
+    (File::from(OwnedFd::from(device)), daemon, path)
 }
 
 /// A port that opens and stays silent while this lives.
@@ -66,7 +70,7 @@ const FAULTS: [Fault; 7] =
 pub struct Cable {
     pub path: PathBuf,
     fault: Arc<AtomicU8>,
-    _thread: JoinHandle<()>,
+    thread: Option<JoinHandle<()>>,
 }
 
 impl Cable {
@@ -82,11 +86,21 @@ impl Cable {
         let fault = Arc::new(AtomicU8::new(Fault::None as u8));
         let shared = Arc::clone(&fault);
         let thread = std::thread::spawn(move || carry(near, far, held, &shared));
-        Self { path, fault, _thread: thread }
+        Self { path, fault, thread: Some(thread) }
     }
 
     pub fn set(&self, fault: Fault) {
         self.fault.store(fault as u8, Ordering::Relaxed);
+    }
+}
+
+impl Cable {
+    /// Takes it off both ends, so that another may open the device's port.
+    pub fn pull(&mut self) {
+        self.set(Fault::Unplugged);
+        if let Some(thread) = self.thread.take() {
+            thread.join().expect("it carried bytes to the end");
+        }
     }
 }
 
@@ -121,7 +135,7 @@ fn carry(mut near: File, mut far: File, held: File, fault: &AtomicU8) {
         let answered = far.read(&mut bytes).unwrap_or(0);
         if answered > 0 {
             match fault {
-                Fault::OtherUnit => bytes[0] = bytes[0].wrapping_add(1),
+                Fault::OtherUnit => readdress(&mut bytes[..answered]),
                 Fault::FlippedBit => bytes[answered / 2] ^= 0x10,
                 _ => {}
             }
@@ -134,6 +148,17 @@ fn carry(mut near: File, mut far: File, held: File, fault: &AtomicU8) {
         }
     }
     drop(held);
+}
+
+/// Makes an answer a faultless one of the next unit.
+fn readdress(frame: &mut [u8]) {
+    let Some((body, tail)) = frame.split_last_chunk_mut::<2>() else { return };
+    body[0] = body[0].wrapping_add(1);
+    // Modbus over Serial Line V1.02, §6.2: reflected 8005h, started at FFFFh, low byte first.
+    let crc = body.iter().fold(0xFFFF_u16, |crc, byte| {
+        (0..8).fold(crc ^ u16::from(*byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xA001 } else { crc >> 1 })
+    });
+    *tail = crc.to_le_bytes();
 }
 
 /// Writes all of it, waiting for a full line a little; what still does not pass is lost, as on a wire.
