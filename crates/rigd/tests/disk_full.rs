@@ -34,7 +34,7 @@ fn check(name: &str, sim: &Sim, run: &Run, ended: &Ended, needles: &[&str]) {
     println!("{name}: {} samples in {} bytes, {}", info.samples_in_file, info.bytes, info.completeness);
     assert!(info.samples_in_file > 10_000 && info.losses_in_file == 0, "{info:?}");
     let messages: u64 = info.channels.iter().map(|channel| channel.messages).sum();
-    if let Some(counts) = python_counts("stream", &[log.clone()]) {
+    if let Some(counts) = python_counts("stream", std::slice::from_ref(&log)) {
         assert_eq!(counts, [messages]);
     }
     if info.completeness.is_complete()
