@@ -209,3 +209,8 @@ def test_pair_files_that_cannot_be_read(tmp_path):
         gm.GearPair.from_toml(tmp_path)
     with pytest.raises(gm.GeometryError, match="line 2.*excentricity"):
         gm.GearPair.from_toml('kind = "elliptical"\nexcentricity = 0.3\n')
+
+
+def test_exceptions_travel_between_processes():
+    error = pickle.loads(pickle.dumps(gm.GeometryError("centre distance")))
+    assert type(error) is gm.GeometryError and isinstance(error, ValueError) and str(error) == "centre distance"
