@@ -150,7 +150,8 @@ where
     DB::ErrorType: 'static,
 {
     let Some(mut ranges) = bounds(panel) else { return Ok(None) };
-    let area = area.titled(&panel.title, (font::SANS, 18 * scale))?;
+    // The font reaches above the line that plotters allots to a title.
+    let area = area.margin(6 * scale, 0, 0, 0).titled(&panel.title, (font::SANS, 18 * scale))?;
     if panel.equal_scale {
         ranges = equalise(ranges, area.dim_in_pixel(), scale);
     }

@@ -1,11 +1,13 @@
 //! The command line. One command is one file; here they are only routed.
 
 mod directions;
+mod import;
 mod info;
 mod model;
 mod replay;
 mod run;
 mod sim;
+mod simulator;
 mod stop;
 
 use std::process::ExitCode;
@@ -53,6 +55,8 @@ enum Command {
     Replay(replay::Args),
     /// Say what is in a log
     Info(info::Args),
+    /// Make a log from a table of angles (CSV, Parquet)
+    Import(import::Args),
     /// Ask the model of a gear pair: TE, backlash, drawings, checks
     Model(Box<model::Args>),
     /// Start the simulated rig in real time, on ports of its own
@@ -77,6 +81,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::main(&args),
         Command::Replay(args) => replay::main(&args),
         Command::Info(args) => info::main(&args),
+        Command::Import(args) => import::main(&args),
         Command::Model(args) => model::main(&args),
         Command::Sim(args) => sim::main(&args),
         Command::Stop(args) => stop::main(&args),
