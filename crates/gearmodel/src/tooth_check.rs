@@ -5,8 +5,8 @@
 use std::f64::consts::TAU;
 
 use crate::flank::Gear;
-use crate::pitch_curve::highest;
-use crate::{GearPair, GeometryError};
+use crate::pitch_curve::{CELLS, refine};
+use crate::{GearPair, GeometryError, RollPoint};
 
 /// Narrowest tip that still has metal, in modules: below it a hardened tip breaks off.
 const MIN_TIP_MODULES: f64 = 0.2;
@@ -25,10 +25,18 @@ impl GearPair {
         if !self.has_teeth() {
             return Ok(());
         }
+        // One scan serves all limits of both gears.
+        let rolls: Vec<RollPoint> = (0..CELLS).map(|n| self.roll(TAU * f64::from(n) / f64::from(CELLS))).collect();
+        let highest = |function: &dyn Fn(&RollPoint) -> f64| {
+            let scanned = rolls.iter().map(|roll| (roll.at.theta1_rad, function(roll)));
+            let (theta, value) =
+                scanned.fold((0.0, f64::NEG_INFINITY), |best, cell| if cell.1 > best.1 { cell } else { best });
+            refine(theta, value, |theta| function(&self.roll(theta)))
+        };
         for gear in [Gear::Driver, Gear::Driven] {
             let number = gear.number();
-            let (theta1_rad, sharpest) = highest(|theta| self.pitch_curvature(gear, &self.roll(theta)));
-            let (concave_at_rad, flattest) = highest(|theta| -self.pitch_curvature(gear, &self.roll(theta)));
+            let (theta1_rad, sharpest) = highest(&|roll| self.pitch_curvature(gear, roll));
+            let (concave_at_rad, flattest) = highest(&|roll| -self.pitch_curvature(gear, roll));
             if flattest > 1e-12 {
                 let radius_mm = -1.0 / flattest;
                 return Err(GeometryError::Concave { gear: number, theta1_rad: concave_at_rad, radius_mm });
@@ -39,16 +47,14 @@ impl GearPair {
             if radius_mm < limit_mm {
                 return Err(GeometryError::Undercut { gear: number, theta1_rad, radius_mm, limit_mm });
             }
-            let (pointed_at_rad, thinnest) = highest(|theta| -self.tip_thickness_mm(gear, theta));
+            let (pointed_at_rad, thinnest) = highest(&|roll| -self.tip_thickness_mm(gear, roll));
             let limit_mm = MIN_TIP_MODULES * self.module_mm();
             if -thinnest < limit_mm {
                 let (theta1_rad, thickness_mm) = (pointed_at_rad, -thinnest);
                 return Err(GeometryError::Pointed { gear: number, theta1_rad, thickness_mm, limit_mm });
             }
-            let (smallest_at_rad, smallest) = highest(|theta| {
-                let at = self.at(theta);
-                -(if gear == Gear::Driver { at.r1_mm } else { at.r2_mm })
-            });
+            let (smallest_at_rad, smallest) =
+                highest(&|roll| -(if gear == Gear::Driver { roll.at.r1_mm } else { roll.at.r2_mm }));
             let dedendum_mm = (self.addendum() + self.dedendum_clearance()) * self.module_mm();
             if -smallest <= dedendum_mm {
                 return Err(GeometryError::NoRoot {
@@ -64,8 +70,8 @@ impl GearPair {
 
     /// Thickness of a tooth at the addendum, mm, as cut where the pitch curve has its curvature at θ1:
     /// (ρ + h)·[t/ρ + 2 inv α − 2 inv α_a], cos α_a = ρ cos α/(ρ + h), t = π m/2 less half the backlash.
-    fn tip_thickness_mm(&self, gear: Gear, theta1_rad: f64) -> f64 {
-        let rho = self.curvature_radius_mm(gear, theta1_rad);
+    fn tip_thickness_mm(&self, gear: Gear, roll: &RollPoint) -> f64 {
+        let rho = 1.0 / self.pitch_curvature(gear, roll);
         let height = self.addendum() * self.module_mm();
         let thickness = 0.25 * TAU * self.module_mm() - 0.5 * self.backlash_mm();
         let alpha = self.pressure_angle_rad();

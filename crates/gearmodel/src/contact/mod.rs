@@ -229,8 +229,8 @@ impl ContactModel {
     }
 
     /// TE at θ1 to first order, rad: the increment of eccentricities, displacement and designed backlash along the common
-    /// normal plus the lead of the most advanced tooth pair in the nominal contact zone over the driven base arm. Good to
-    /// about 0.1 % of the peak-to-peak for errors up to 0.1 mm at m = 3 mm; tips are taken at their nominal position.
+    /// normal plus the lead of the most advanced tooth pair in the nominal contact zone over the driven base arm; tips
+    /// are taken at their nominal position. [`GearPair::first_order_limit_mm`] says how far this holds.
     ///
     /// # Errors
     /// [`ContactError::NoTeeth`] or [`ContactError::NoPairInZone`].

@@ -17,7 +17,7 @@ pub use ellipse::Ellipse;
 pub(crate) use ellipse::MAX_ECCENTRICITY;
 pub use lobed::Lobed;
 pub use numeric::Numeric;
-pub(crate) use numeric::highest;
+pub(crate) use numeric::{CELLS, highest, refine};
 
 /// Angle and ratio of the driven gear at one angle of the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
