@@ -24,3 +24,8 @@ deny:
 # Redraws the pictures of the README.
 pictures:
     scripts/pictures
+
+# CPU of the daemon alone in real time, rig in a process of its own.
+bench-cpu:
+    cargo build --release -p rigd
+    python3 scripts/bench_cpu.py

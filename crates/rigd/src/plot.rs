@@ -13,7 +13,7 @@ use crate::chart::{Chart, ChartError, Ink, Mark, Panel, Series};
 #[derive(Debug, Error)]
 pub enum PlotError {
     /// Drawing failed.
-    #[error("picture {path}: {error}; the log itself is complete")]
+    #[error("picture {path}: {error}; TE and backlash are in the log and the summary all the same")]
     Chart {
         /// The picture.
         path: PathBuf,

@@ -1,13 +1,12 @@
 //! `rigd run`: drive the rig, record, and compute TE and backlash.
 
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::Duration;
 
 use riglog::LogError;
 use tokio::task::LocalSet;
 
 use super::directions::Directions;
+use super::simulator::Simulator;
 use super::{Exit, fail, print, stop};
 use crate::clock::Clock;
 use crate::profile::Profile;
@@ -267,44 +266,37 @@ fn warnings(setup: &Setup) -> Vec<String> {
 fn execute(args: &Args, setup: Setup, spec: Option<sim::PlantSpec>) -> Exit {
     let seed = args.seed.unwrap_or(1);
     match spec {
-        None => real(args, setup),
-        Some(_) if args.time_scale == Some(TimeScale::Real) => match Simulator::start(args, seed) {
-            Ok(simulator) => {
-                let profile = Profile { name: setup.profile.name.clone(), ..simulator.profile.clone() };
-                let exit = real(args, Setup { profile, ..setup });
-                drop(simulator);
-                exit
-            }
-            Err(error) => {
-                eprintln!("error: the simulated rig did not start: {error}");
-                Exit::Failed
-            }
-        },
-        Some(spec) => {
-            let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
-            in_runtime(
-                runtime,
-                args,
-                setup,
-                |plan| sim::start_in_process(&spec, plan.rate_hz, seed).map_err(|error| error.to_string()),
-                Clock::simulated,
-            )
-        }
+        None => in_runtime(args, setup, Time::Real, |_| Ok((Links::default(), None))),
+        Some(_) if args.time_scale == Some(TimeScale::Real) => in_runtime(args, setup, Time::Real, |setup| {
+            let pair = args.model.as_deref().or(args.pair.as_deref());
+            let simulator = Simulator::start(seed, pair, &args.undocumented)?;
+            setup.profile = Profile { name: setup.profile.name.clone(), ..simulator.profile().clone() };
+            Ok((Links::default(), Some(simulator)))
+        }),
+        Some(spec) => in_runtime(args, setup, Time::Simulated, |setup| {
+            let links = sim::start_in_process(&spec, setup.plan.rate_hz, seed).map_err(|error| error.to_string())?;
+            Ok((links, None))
+        }),
     }
 }
 
-fn real(args: &Args, setup: Setup) -> Exit {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-    in_runtime(runtime, args, setup, |_| Ok(Links::default()), Clock::real)
+/// Whose time the runtime keeps.
+#[derive(Clone, Copy, PartialEq)]
+enum Time {
+    Real,
+    /// Jumps from timer to timer.
+    Simulated,
 }
 
+/// Runs a session once `connect` has made the links; signals are heard before it, so that none is missed.
 fn in_runtime(
-    runtime: std::io::Result<tokio::runtime::Runtime>,
     args: &Args,
-    setup: Setup,
-    links: impl FnOnce(&Plan) -> Result<Links, String>,
-    clock: impl FnOnce() -> Clock,
+    mut setup: Setup,
+    time: Time,
+    connect: impl FnOnce(&mut Setup) -> Result<(Links, Option<Simulator>), String>,
 ) -> Exit {
+    let simulated = time == Time::Simulated;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(simulated).build();
     let runtime = match runtime {
         Ok(runtime) => runtime,
         Err(error) => return fail(Exit::Failed, &error),
@@ -314,8 +306,9 @@ fn in_runtime(
     let warnings = warnings(&setup);
     let outcome = LocalSet::new().block_on(&runtime, async move {
         let stop = StopRequests::listen().map_err(|error| format!("signals: {error}"))?;
-        let links = links(&setup.plan)?;
-        session::run(setup, links, clock(), stop).await.map_err(|error| error.to_string())
+        let (links, _simulator) = connect(&mut setup)?;
+        let clock = if simulated { Clock::simulated() } else { Clock::real() };
+        session::run(setup, links, clock, stop).await.map_err(|error| error.to_string())
     });
     match outcome {
         Err(error) => {
@@ -370,69 +363,5 @@ fn conclude(args: &Args, path: &Path, backend: String, warnings: Vec<String>, ou
             Exit::Stopped
         }
         Some(halt) => fail(Exit::Halted, halt),
-    }
-}
-
-/// `rigd sim` as a process of its own, ended when dropped.
-struct Simulator {
-    process: Child,
-    directory: PathBuf,
-    profile: Profile,
-}
-
-impl Simulator {
-    fn start(args: &Args, seed: u64) -> Result<Self, String> {
-        use std::io::{BufRead as _, BufReader};
-        use std::os::unix::process::CommandExt as _;
-        let directory = std::env::temp_dir().join(format!("rigd-sim-{}", std::process::id()));
-        let program = std::env::current_exe().map_err(|error| error.to_string())?;
-        let mut command = Command::new(program);
-        command.arg("sim").arg("--pty-dir").arg(&directory).arg("--seed").arg(seed.to_string());
-        if let Some(pair) = args.model.as_ref().or(args.pair.as_ref()) {
-            command.arg("--pair").arg(pair);
-        }
-        for name in &args.undocumented {
-            command.arg("--undocumented").arg(name);
-        }
-        // A group of its own: Ctrl-C stops the run, and only then the rig.
-        command.process_group(0).stdin(Stdio::null()).stdout(Stdio::piped());
-        let mut process = command.spawn().map_err(|error| error.to_string())?;
-        let ready = process
-            .stdout
-            .take()
-            .is_some_and(|output| BufReader::new(output).lines().map_while(Result::ok).any(|line| line == "ready"));
-        let profile = if ready {
-            Profile::load(&directory.join("profile.toml")).map_err(|error| error.to_string())
-        } else {
-            Err("it ended before it was ready".into())
-        };
-        match profile {
-            Ok(profile) => Ok(Self { process, directory, profile }),
-            Err(error) => {
-                end(&mut process);
-                Err(error)
-            }
-        }
-    }
-}
-
-/// Asks the process to end, then makes it.
-fn end(process: &mut Child) {
-    let pid = nix::unistd::Pid::from_raw(process.id() as i32);
-    let _ = nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM);
-    for _ in 0..50 {
-        if matches!(process.try_wait(), Ok(Some(_))) {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    let _ = process.kill();
-    let _ = process.wait();
-}
-
-impl Drop for Simulator {
-    fn drop(&mut self) {
-        end(&mut self.process);
-        let _ = std::fs::remove_dir_all(&self.directory);
     }
 }

@@ -81,6 +81,12 @@ pub enum Halt {
         /// Where it stands.
         now: String,
     },
+    /// A defect of this program.
+    #[error("this program failed: {what}; the rig was switched off in order; please report it with the log")]
+    Panic {
+        /// The panic's message.
+        what: String,
+    },
     /// The log cannot be written.
     #[error(transparent)]
     Log(#[from] riglog::LogError),

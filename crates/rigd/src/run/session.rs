@@ -1,8 +1,10 @@
 //! A session: open the log, connect, run the plan, switch off, finalise, and say what came of it.
 
 use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::task::Poll;
 
 use gearmodel::NominalModel;
 use nix::libc::SIGXFSZ;
@@ -110,7 +112,7 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
                 stop,
                 progress,
             );
-            let halt = sequence::execute(&mut rig, devices.counter, &setup.plan).await.err();
+            let halt = survive(sequence::execute(&mut rig, devices.counter, &setup.plan)).await.err();
             if let Some(halt) = &halt {
                 acquisition.borrow().event(Level::Error, "halt", halt.to_string());
             }
@@ -147,6 +149,20 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
         }
     }
     Ok(Outcome { analysis, halt, troubles, lost, unwritten })
+}
+
+/// Makes a panic of the sequence a reason to switch off in order, as any other.
+async fn survive(sequence: impl Future<Output = Result<(), Halt>>) -> Result<(), Halt> {
+    let mut sequence = std::pin::pin!(sequence);
+    std::future::poll_fn(|context| {
+        // The rig is only switched off afterwards, from whatever state it is in.
+        catch_unwind(AssertUnwindSafe(|| sequence.as_mut().poll(context))).unwrap_or_else(|panic| {
+            let what = panic.downcast_ref::<&str>().map(ToString::to_string);
+            let what = what.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
+            Poll::Ready(Err(Halt::Panic { what }))
+        })
+    })
+    .await
 }
 
 /// A log that reaches the process's file size limit (`ulimit -f`) shall be an error of the write and a stop in order; unhandled, the
@@ -231,4 +247,21 @@ pub fn log_path(directory: &Path, plan: &Plan) -> PathBuf {
         .map(|n| directory.join(if n == 0 { format!("{stem}.mcap") } else { format!("{stem}_{n}.mcap") }))
         .find(|path| !path.exists())
         .unwrap_or_else(|| directory.join(format!("{stem}.mcap")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_panic_is_a_halt_with_its_message() {
+        let outcome = survive(async {
+            tokio::task::yield_now().await;
+            panic!("no such {}", "thing")
+        })
+        .await;
+        assert!(matches!(outcome, Err(Halt::Panic { what }) if what == "no such thing"));
+        assert!(survive(async { Ok(()) }).await.is_ok());
+        assert!(matches!(survive(async { Err(Halt::Operator) }).await, Err(Halt::Operator)));
+    }
 }
