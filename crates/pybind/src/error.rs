@@ -70,7 +70,7 @@ impl From<InputError> for Raised {
     fn from(error: InputError) -> Self {
         Self(match error {
             InputError::NotNumbers { .. } => PyTypeError::new_err(error.to_string()),
-            InputError::Teeth { .. } => GeometryError::new_err(error.to_string()),
+            InputError::Teeth { .. } | InputError::Lobes { .. } => GeometryError::new_err(error.to_string()),
             _ => PyValueError::new_err(error.to_string()),
         })
     }
@@ -147,6 +147,14 @@ pub enum InputError {
         gear: u8,
         /// The number given.
         given: String,
+    },
+    /// A number of lobes that is no whole number.
+    #[error("gear {gear} has {given} lobes: a whole number of at least 1 is needed")]
+    Lobes {
+        /// 1 = driver, 2 = driven.
+        gear: u8,
+        /// The number given.
+        given: f64,
     },
     /// A method that does not exist.
     #[error("method {given:?} is unknown: write \"common_normal\", \"exact\" or \"published\"")]

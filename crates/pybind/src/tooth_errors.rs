@@ -6,6 +6,7 @@ use pyo3::types::{PyDict, PyTuple};
 
 use crate::array::column;
 use crate::error::Result;
+use crate::pair::drawing::tooth_number;
 
 /// The same profile deviation on every tooth of a flank, over the phase u in pitches of rolling from the pitch point.
 ///
@@ -71,7 +72,7 @@ impl Profile {
 ///     flank: "ccw" or "cw", the driving sense in which it carries.
 ///
 /// Raises:
-///     ValueError: another flank.
+///     ValueError: another flank, or a tooth below 0.
 ///
 /// >>> import gearmodel as gm
 /// >>> gm.ToothDamage(tooth=5, depth_mm=0.02, width=0.3)
@@ -84,7 +85,8 @@ pub struct ToothDamage(contact::ToothDamage);
 impl ToothDamage {
     #[new]
     #[pyo3(signature = (tooth, depth_mm, width, flank="ccw"))]
-    fn new(tooth: u32, depth_mm: f64, width: f64, flank: &str) -> Result<Self> {
+    fn new(tooth: i64, depth_mm: f64, width: f64, flank: &str) -> Result<Self> {
+        let tooth = tooth_number(tooth)?;
         Ok(Self(contact::ToothDamage { tooth, flank: flank.parse::<Direction>()?, depth_mm, width }))
     }
 

@@ -61,6 +61,8 @@ def test_what_does_not_fit_is_refused(pair):
         gm.ToothErrors(driver_ccw_mm=[[0.1]])
     with pytest.raises(ValueError, match="left"):
         gm.ToothDamage(0, 0.1, 1.0, "left")
+    with pytest.raises(ValueError, match="tooth -1"):
+        gm.ToothDamage(-1, 0.1, 1.0)
 
 
 def test_copies_are_equal():

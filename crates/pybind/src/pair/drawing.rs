@@ -19,7 +19,8 @@ pub fn gear(number: i64) -> Result<Gear> {
     }
 }
 
-fn tooth(number: i64) -> Result<u32> {
+/// A tooth's number as the model counts.
+pub fn tooth_number(number: i64) -> Result<u32> {
     if number < 0 {
         return Err(InputError::Tooth { given: number }.into());
     }
@@ -62,7 +63,7 @@ impl GearPair {
         side: &str,
         n: usize,
     ) -> Result<Bound<'py, PyArray2<f64>>> {
-        let (gear, tooth, side) = (self::gear(gear)?, self::tooth(tooth)?, side.parse::<Direction>()?);
+        let (gear, tooth, side) = (self::gear(gear)?, tooth_number(tooth)?, side.parse::<Direction>()?);
         points(py, py.detach(|| self.model.pair.flank(gear, tooth, side, n))?)
     }
 

@@ -38,6 +38,15 @@ fn teeth(given: &Bound<'_, PyAny>) -> Result<(u32, u32)> {
     }
 }
 
+/// Lobes as a whole number; how many there may be is the model's to say.
+fn whole_lobes(gear: u8, given: f64) -> Result<u32> {
+    if given.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&given) {
+        Ok(given as u32)
+    } else {
+        Err(InputError::Lobes { gear, given }.into())
+    }
+}
+
 /// Amplitudes of orders 1, 2, …; left out = none.
 fn waves(field: &'static str, given: Option<&Bound<'_, PyAny>>) -> Result<Vec<f64>> {
     given.map_or(Ok(Vec::new()), |given| column(field, given))
@@ -197,7 +206,7 @@ impl GearPair {
         module_mm: f64,
         teeth: &Bound<'_, PyAny>,
         eccentricity: f64,
-        lobes: (u32, u32),
+        lobes: (f64, f64),
         pressure_angle_deg: f64,
         centre_distance_mm: Option<f64>,
         backlash_mm: f64,
@@ -216,6 +225,7 @@ impl GearPair {
             dedendum_clearance,
         }
         .spec()?;
+        let lobes = (whole_lobes(1, lobes.0)?, whole_lobes(2, lobes.1)?);
         Self::from_spec(PairSpec::Free { teeth, curve: CurveSpec::Lobed { eccentricity, lobes } })
     }
 

@@ -1,6 +1,6 @@
 //! `GearPair`: a pair with its documented errors. Its methods stand in files of one idea each.
 
-mod drawing;
+pub mod drawing;
 mod increment;
 mod kinematics;
 pub mod loaded;
