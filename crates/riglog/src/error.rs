@@ -55,10 +55,8 @@ pub enum LogError {
         at_byte: u64,
     },
     /// The log was ended, but not with everything that it was given.
-    #[error("{} lacks its last {lost_messages} messages: {wanted_bytes} bytes at byte {at_byte} could not be written: {source}; {}; {}",
-        path.display(),
-        if *finalised { "what is there is complete in itself" } else { "what is there has no end record and is finalised at the next start" },
-        advice(source))]
+    #[error("{} lacks its last {lost_messages} messages: {wanted_bytes} bytes at byte {at_byte} could not be written: {source}; what is there is readable and is finalised at the next start; {}",
+        path.display(), advice(source))]
     Incomplete {
         /// The file.
         path: PathBuf,
@@ -68,8 +66,6 @@ pub enum LogError {
         at_byte: u64,
         /// How much was to be written there.
         wanted_bytes: u64,
-        /// Whether the file got its summary all the same.
-        finalised: bool,
         /// What the operating system answered.
         source: io::Error,
     },

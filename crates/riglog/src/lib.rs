@@ -9,12 +9,12 @@
 
 mod batch;
 mod completeness;
-mod container;
 mod error;
 mod info;
 mod metadata;
 pub mod proto;
 mod reader;
+mod record;
 mod recover;
 mod run_stream;
 mod runs;

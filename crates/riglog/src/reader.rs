@@ -169,14 +169,14 @@ pub(crate) fn open(path: &Path) -> Result<(BufReader<File>, u64), LogError> {
 pub(crate) fn check_channels<R: Read + Seek>(mut walk: Walk<R>) -> Result<(), LogError> {
     loop {
         let more = walk.next()?.is_some();
-        if walk.channels().any(|(_, channel)| channel.topic.is_some()) {
+        if walk.channels().any(|channel| channel.topic.is_some()) {
             return Ok(());
         }
         if !more {
             break;
         }
     }
-    let topics: Vec<_> = walk.channels().map(|(_, channel)| channel.name.clone()).collect();
+    let topics: Vec<_> = walk.channels().map(|channel| channel.name.clone()).collect();
     let complete = walk.completeness().is_some_and(Completeness::is_complete);
     if topics.is_empty() && !complete {
         return Ok(());
@@ -197,10 +197,10 @@ pub(crate) fn bad_message(
 
 fn decode(event: Event<'_>, path: &Path) -> Result<Record, LogError> {
     let (at_byte, topic, channel, message) = match event {
-        Event::Message { chunk_at, topic, channel, message } => (chunk_at, topic, channel, message),
+        Event::Message { chunk_at, topic, channel, message, .. } => (chunk_at, topic, channel, message),
         Event::Metadata { name, map } => return metadata(name, map),
-        Event::Attachment { name, media_type, data } => {
-            return Ok(Record::Attachment { name, media_type, data: data.to_vec() });
+        Event::Attachment { header, data } => {
+            return Ok(Record::Attachment { name: header.name, media_type: header.media_type, data: data.to_vec() });
         }
     };
     let Some(topic) = topic else { return Ok(Record::Unknown { topic: channel.to_owned() }) };

@@ -1,28 +1,41 @@
-//! Finalises what a killed writer left: keeps every whole record where it is, cuts off what is not whole, and
-//! appends the end that is missing.
+//! Finalises what a killed writer left: copies every record that can be read into a log with an end, which then takes
+//! the file's name.
 
 use std::{
+    ffi::OsString,
     fs::{File, OpenOptions, TryLockError},
-    io::{BufReader, Read, Seek, SeekFrom, Write},
+    io::{self, BufReader, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
-use zstd::bulk::Decompressor;
+use mcap::{
+    Attachment, McapError,
+    records::{Metadata, Record, op},
+};
 
 use crate::{
     completeness::{Completeness, Defect},
-    container::{
-        MAGIC, RECORD_HEAD_BYTES,
-        bytes::Fields,
-        chunk::{ChunkIndex, InnerRecord, MessageIndexes, MessageView, put_indexes},
-        op,
-        scan::Scanner,
-        summary::TAIL_BYTES,
-    },
     error::LogError,
     reader::{check_channels, open},
-    walk::Walk,
+    record::{RECORD_HEAD_BYTES, parse},
+    walk::{
+        Event, Walk,
+        records::{Records, Step},
+    },
+    write::{
+        WriterOptions,
+        encoder::{Encoder, io_error},
+        sync_directory_of,
+    },
 };
+
+/// Footer record and end magic.
+const TAIL_BYTES: u64 = RECORD_HEAD_BYTES + FOOTER_BYTES as u64 + mcap::MAGIC.len() as u64;
+const FOOTER_BYTES: usize = 8 + 8 + 4;
+/// The record that ends the data, right before the summary.
+const DATA_END_BYTES: u64 = RECORD_HEAD_BYTES + 4;
+/// Messages outside of chunks are gathered into chunks of this size.
+const CHUNK_BYTES: usize = 1 << 20;
 
 /// What [`recover()`] did.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,38 +46,39 @@ pub struct Recovery {
     pub already_complete: bool,
     /// Messages in the file.
     pub kept_messages: u64,
-    /// Bytes that belonged to no whole record, or to an end that broke off, and were cut off.
+    /// Bytes that belonged to no whole record, or to an end that broke off, and were left out.
     pub dropped_bytes: u64,
-    /// What was found. `Truncated` is what a killed writer leaves; damage stays in the file, left out of its index.
+    /// What was found. `Truncated` is what a killed writer leaves. Where it is `Damaged`, the file as it was is kept
+    /// beside the recovered one, under its name with `.damaged` added.
     pub found: Completeness,
 }
 
 /// A file of a directory and what became of it.
 pub type RecoveredFile = (PathBuf, Result<Recovery, LogError>);
 
-/// Gives a log that was cut off its end, in place: nothing that is whole is moved or copied, so a crash in the
-/// middle leaves a file that can be recovered again. A file that has an end is left as it is.
+/// Gives a log that was cut off its end: what can be read of it is copied to a file beside it, which takes its name
+/// once it is whole and on the disk. A crash in the middle leaves the file as it was. A file that has an end is left
+/// as it is.
 ///
 /// # Errors
-/// Another process writes the file, it is no rig log, not even its head is whole, or it cannot be written.
+/// Another process writes the file, it is no rig log, not even its head is whole, or there is no room for the copy.
 pub fn recover(path: impl AsRef<Path>) -> Result<Recovery, LogError> {
     let path = path.as_ref();
     if let Some(kept_messages) = messages_by_footer(path)? {
-        return Ok(Recovery {
-            path: path.to_owned(),
-            already_complete: true,
-            kept_messages,
-            dropped_bytes: 0,
-            found: Completeness::Complete,
-        });
+        return Ok(untouched(path, kept_messages, Completeness::Complete));
     }
+    // Opened for writing, though it is not written: who may not change the log may not replace it.
     let file = OpenOptions::new().read(true).write(true).open(path).map_err(LogError::io("open", path))?;
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => return Err(LogError::Locked { path: path.to_owned() }),
         Err(TryLockError::Error(source)) => return Err(LogError::io("lock", path)(source)),
     }
-    finalise(file, path)
+    // Whoever held the lock until now may have finished the file, or put another in its place.
+    if let Some(kept_messages) = messages_by_footer(path)? {
+        return Ok(untouched(path, kept_messages, Completeness::Complete));
+    }
+    finalise(path)
 }
 
 /// Recovers every `*.mcap` file in a directory, each by itself: one that cannot be recovered does not keep the
@@ -76,7 +90,7 @@ pub fn recover_directory(directory: impl AsRef<Path>) -> Result<Vec<RecoveredFil
     let directory = directory.as_ref();
     let entries = match std::fs::read_dir(directory) {
         Ok(entries) => entries,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         Err(error) => return Err(LogError::io("list", directory)(error)),
     };
     let mut paths = Vec::new();
@@ -90,145 +104,136 @@ pub fn recover_directory(directory: impl AsRef<Path>) -> Result<Vec<RecoveredFil
     Ok(paths.into_iter().map(|path| (path.clone(), recover(&path))).collect())
 }
 
+fn untouched(path: &Path, kept_messages: u64, found: Completeness) -> Recovery {
+    Recovery { path: path.to_owned(), already_complete: true, kept_messages, dropped_bytes: 0, found }
+}
+
 /// Number of messages of a file whose summary is whole, found at its end without reading its data.
 fn messages_by_footer(path: &Path) -> Result<Option<u64>, LogError> {
     let (mut source, bytes) = open(path)?;
     let io = |source| LogError::Io { action: "read", path: path.to_owned(), source };
-    if bytes < MAGIC.len() as u64 + TAIL_BYTES {
-        return Ok(None);
-    }
-    let mut tail = [0; TAIL_BYTES as usize];
-    source.seek(SeekFrom::Start(bytes - TAIL_BYTES)).map_err(io)?;
-    source.read_exact(&mut tail).map_err(io)?;
-    let Some(footer) = tail.strip_suffix(MAGIC).filter(|footer| footer[0] == op::FOOTER) else {
-        return Ok(None);
-    };
-    let mut fields = Fields::new("footer", &footer[RECORD_HEAD_BYTES as usize..]);
-    let (Ok(summary_at), Ok(_), Ok(crc)) =
-        (fields.u64("summary start"), fields.u64("offset start"), fields.u32("checksum"))
-    else {
-        return Ok(None);
-    };
-    const LARGEST_SUMMARY: u64 = 64 << 20;
-    let crc_at = bytes - MAGIC.len() as u64 - 4;
-    if summary_at >= crc_at || crc_at - summary_at > LARGEST_SUMMARY {
-        return Ok(None);
-    }
-    let mut summary = vec![0; (crc_at - summary_at) as usize];
-    source.seek(SeekFrom::Start(summary_at)).map_err(io)?;
-    source.read_exact(&mut summary).map_err(io)?;
-    if crc32fast::hash(&summary) != crc {
-        return Ok(None);
-    }
-    let mut offset = 0;
-    while let Ok(Some(record)) = InnerRecord::at(&summary, offset) {
-        if record.opcode == op::STATISTICS {
-            return Ok(Fields::new("statistics", record.content).u64("messages").ok());
+    let Some(tail_at) = bytes.checked_sub(TAIL_BYTES) else { return Ok(None) };
+    let mut footer = [0; RECORD_HEAD_BYTES as usize + FOOTER_BYTES];
+    source.seek(SeekFrom::Start(tail_at)).map_err(io)?;
+    source.read_exact(&mut footer).map_err(io)?;
+    let (head, footer) = footer.split_at(RECORD_HEAD_BYTES as usize);
+    let Ok(Record::Footer(footer)) = parse(op::FOOTER, footer) else { return Ok(None) };
+    let data_end_at = footer.summary_start.checked_sub(DATA_END_BYTES);
+    let Some(data_end_at) = data_end_at.filter(|at| head[0] == op::FOOTER && *at < tail_at) else { return Ok(None) };
+    // From the end of the data on, checksum and end magic of the summary are checked.
+    let mut records = Records::new(source, bytes).map_err(io)?;
+    records.restart(data_end_at).map_err(io)?;
+    let (mut messages, mut first) = (None, true);
+    loop {
+        match records.step().map_err(io)? {
+            Step::Record(place) if first && place.opcode != op::DATA_END => return Ok(None),
+            Step::Record(place) if place.opcode == op::STATISTICS => {
+                if let Ok(Record::Statistics(statistics)) = parse(op::STATISTICS, records.content()) {
+                    messages = Some(statistics.message_count);
+                }
+            }
+            Step::Record(_) => {}
+            Step::End => return Ok(messages),
+            Step::Failed(_) => return Ok(None),
         }
-        offset = record.next;
+        first = false;
     }
-    Ok(None)
 }
 
-fn finalise(mut file: File, path: &Path) -> Result<Recovery, LogError> {
-    let read = LogError::io("read", path);
-    let bytes = file.metadata().map_err(read)?.len();
-    let reader = |file: &File| -> Result<_, LogError> {
-        let mut source = BufReader::new(file.try_clone().map_err(LogError::io("open", path))?);
-        source.seek(SeekFrom::Start(0)).map_err(LogError::io("read", path))?;
-        Ok(source)
-    };
+fn finalise(path: &Path) -> Result<Recovery, LogError> {
+    let (source, bytes) = open(path)?;
     // A foreign file is none of ours to touch.
-    check_channels(Walk::new(reader(&file)?, bytes, path)?)?;
-    let mut walk = Walk::new(reader(&file)?, bytes, path)?;
+    check_channels(Walk::new(source, bytes, path)?)?;
+    let mut walk = Walk::new(open(path)?.0, bytes, path)?;
     while walk.next()?.is_some() {}
     let found = walk.completeness().cloned().unwrap_or(Completeness::Complete);
-    let (has_end, data_end_at) = (walk.has_end(), walk.data_end_at());
-    if !has_end && !walk.channels().any(|(_, channel)| channel.topic.is_some()) {
+    let kept_messages = walk.channels().map(|channel| channel.messages).sum();
+    if walk.has_end() {
+        return Ok(untouched(path, kept_messages, found));
+    }
+    if !walk.channels().any(|channel| channel.topic.is_some()) {
         return Err(LogError::NothingToRecover { path: path.to_owned(), why: Defect::NoHead { bytes } });
     }
-    let mut summary = walk.into_summary();
-    let kept_messages = summary.messages();
-    if has_end {
-        return Ok(Recovery { path: path.to_owned(), already_complete: true, kept_messages, dropped_bytes: 0, found });
-    }
-    // The writer may have been cut off between a chunk and its indexes: they are made anew.
-    let (mut keep, mut end) = (data_end_at, Vec::new());
-    if let Some(chunk) = summary.chunks.last_mut()
-        && chunk.offset + chunk.length + chunk.indexes_length == data_end_at
-    {
-        let indexes = indexes_of(chunk, reader(&file)?, bytes, path)?;
-        if indexes.len() != chunk.index_offsets.len() {
-            keep = chunk.offset + chunk.length;
-            chunk.index_offsets = put_indexes(&indexes, keep, &mut end);
-            chunk.indexes_length = end.len() as u64;
+    let copy = beside(path, ".recovering");
+    let copied = copy_to(&copy, path, &walk).and_then(|()| {
+        if let Completeness::Damaged { .. } = found {
+            keep_damaged(path)?;
         }
+        std::fs::rename(&copy, path).map_err(LogError::io("replace", path))
+    });
+    if copied.is_err() {
+        // The log is as it was; half a copy would only take room.
+        let _ = std::fs::remove_file(&copy);
     }
-    let crc = checksum(reader(&file)?, keep, &end, path)?;
-    let data_length = keep + end.len() as u64;
-    end.extend(summary.encode_end(data_length, crc));
-    append(&mut file, path, keep, &end)?;
-    Ok(Recovery {
-        path: path.to_owned(),
-        already_complete: false,
-        kept_messages,
-        dropped_bytes: bytes - data_end_at,
-        found,
-    })
+    copied?;
+    sync_directory_of(path);
+    let dropped_bytes = bytes - walk.data_end_at();
+    Ok(Recovery { path: path.to_owned(), already_complete: false, kept_messages, dropped_bytes, found })
 }
 
-/// Where the messages of a chunk lie, read from the chunk itself.
-fn indexes_of<R: Read + Seek>(
-    chunk: &ChunkIndex,
-    source: R,
-    bytes: u64,
-    path: &Path,
-) -> Result<MessageIndexes, LogError> {
-    let io = |source| LogError::Io { action: "read", path: path.to_owned(), source };
-    let mut scanner = Scanner::new(source, 0, bytes);
-    scanner.reread(chunk.offset).map_err(io)?;
-    let mut zstd = Decompressor::new().map_err(io)?;
-    let (mut records, mut indexes, mut offset) = (Vec::new(), MessageIndexes::new(), 0);
-    // The chunk was read before; what does not decode now is not indexed.
-    if let Ok(view) = scanner.chunk() {
-        let _ = view.decompress(&mut zstd, &mut records);
-    }
-    while let Ok(Some(record)) = InnerRecord::at(&records, offset) {
-        if record.opcode == op::MESSAGE
-            && let Ok(message) = MessageView::parse(record.content)
-        {
-            indexes.entry(message.channel).or_default().push((message.log_time_ns, offset as u64));
+/// Writes what can be read of the log at `path` to `copy`, chunk by chunk, and syncs it; `seen` has walked over it.
+fn copy_to(copy: &Path, path: &Path, seen: &Walk<BufReader<File>>) -> Result<(), LogError> {
+    let io = |action| move |source| LogError::Io { action, path: copy.to_owned(), source };
+    let encode = |error: McapError| LogError::Compress { path: path.to_owned(), bytes: 0, source: io_error(error) };
+    let mut out = File::create(copy).map_err(io("create"))?;
+    let level = WriterOptions::new("").compression_level;
+    let channels = seen.channels().map(|channel| channel.definition.clone()).collect();
+    let mut encoder = Encoder::new(seen.library(), level, channels).map_err(encode)?;
+    let (source, bytes) = open(path)?;
+    let mut walk = Walk::new(source, bytes, path)?;
+    let (mut of_chunk, mut gathered_bytes) = (0, 0);
+    while let Some(event) = walk.next()? {
+        match event {
+            Event::Message { chunk_at, in_chunk, message, .. } => {
+                // A chunk stays a chunk, so that it is as long in time as its writer wanted it.
+                if (in_chunk && chunk_at != of_chunk) || gathered_bytes >= CHUNK_BYTES {
+                    encoder.close_chunk().map_err(encode)?;
+                    gathered_bytes = 0;
+                }
+                of_chunk = chunk_at;
+                gathered_bytes += message.data.len();
+                encoder.message(&message.header, message.data).map_err(encode)?;
+            }
+            Event::Metadata { name, map } => {
+                encoder.metadata(&Metadata { name, metadata: map }).map_err(encode)?;
+            }
+            Event::Attachment { header, data } => {
+                let (name, media_type, data) = (header.name, header.media_type, data.into());
+                let (log_time, create_time) = (header.log_time, header.create_time);
+                let attachment = Attachment { log_time, create_time, name, media_type, data };
+                encoder.attachment(&attachment).map_err(encode)?;
+            }
         }
-        offset = record.next;
+        let records = encoder.take();
+        if !records.is_empty() {
+            out.write_all(&records).map_err(io("write"))?;
+        }
     }
-    Ok(indexes)
+    let (end, _) = encoder.finish().map_err(encode)?;
+    out.write_all(&end).map_err(io("write"))?;
+    let facts = std::fs::metadata(path).map_err(LogError::io("read", path))?;
+    out.set_permissions(facts.permissions()).map_err(io("set permissions of"))?;
+    out.sync_all().map_err(io("sync"))
 }
 
-/// Checksum of the first `keep` bytes of the file and of `more`.
-fn checksum<R: Read>(source: R, keep: u64, more: &[u8], path: &Path) -> Result<u32, LogError> {
-    let mut source = source.take(keep);
-    let mut crc = crc32fast::Hasher::new();
-    let mut block = vec![0; 1 << 16];
+/// Gives a damaged file a second name, so that what the recovery leaves out of it is not lost.
+fn keep_damaged(path: &Path) -> Result<(), LogError> {
+    let mut number = 1;
     loop {
-        let taken = source.read(&mut block).map_err(LogError::io("read", path))?;
-        if taken == 0 {
-            break;
+        let suffix = if number == 1 { ".damaged".to_owned() } else { format!(".damaged{number}") };
+        let kept = beside(path, &suffix);
+        match std::fs::hard_link(path, &kept) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
+            // File systems without links get a copy.
+            Err(_) => return std::fs::copy(path, &kept).map(drop).map_err(LogError::io("copy", &kept)),
+            Ok(()) => return Ok(()),
         }
-        crc.update(&block[..taken]);
     }
-    crc.update(more);
-    Ok(crc.finalize())
 }
 
-/// Replaces what follows byte `keep` by `end`. A crash before the sync leaves a prefix of that, which recovers again.
-fn append(file: &mut File, path: &Path, keep: u64, end: &[u8]) -> Result<(), LogError> {
-    file.set_len(keep).map_err(LogError::io("cut", path))?;
-    file.seek(SeekFrom::Start(keep)).map_err(LogError::io("write", path))?;
-    if let Err(source) = file.write_all(end) {
-        // What is whole stays; half an end would only be cut off again.
-        let _ = file.set_len(keep);
-        let wanted_bytes = end.len() as u64;
-        return Err(LogError::Write { path: path.to_owned(), at_byte: keep, wanted_bytes, source });
-    }
-    file.sync_all().map_err(LogError::io("sync", path))
+/// The path with `suffix` added to its name; no log's, whose name would end in `.mcap`.
+fn beside(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = OsString::from(path);
+    name.push(suffix);
+    name.into()
 }

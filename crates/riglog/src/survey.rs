@@ -88,7 +88,8 @@ pub(crate) fn survey(path: &Path) -> Result<Survey, LogError> {
                 }
                 survey.metadata.insert(name, map);
             }
-            Event::Attachment { name, media_type, data } => {
+            Event::Attachment { header, data } => {
+                let (name, media_type) = (header.name, header.media_type);
                 let bytes = data.len() as u64;
                 let kept = (data.len() <= KEPT_ATTACHMENT_BYTES).then(|| data.to_vec());
                 survey.attachments.push(AttachmentInfo { name, media_type, bytes, data: kept });
@@ -98,10 +99,10 @@ pub(crate) fn survey(path: &Path) -> Result<Survey, LogError> {
     survey.library = walk.library().to_owned();
     survey.channels = walk
         .channels()
-        .map(|(id, channel)| ChannelInfo {
+        .map(|channel| ChannelInfo {
             topic: channel.name.clone(),
             schema: channel.schema.clone(),
-            messages: walk.count(id),
+            messages: channel.messages,
         })
         .collect();
     if let Some(completeness) = walk.completeness() {

@@ -1,47 +1,65 @@
-//! Walks through a log in file order: unpacks chunks, links messages to channels, checks every
-//! checksum, and gathers what the summary should say.
+//! Walks through a log in file order: unpacks chunks, links messages to channels, checks every checksum, and goes on
+//! behind what is damaged.
 
+mod chunk;
 mod data;
-mod ending;
+pub(crate) mod records;
+mod resync;
 
 use std::{
-    io::{self, Read, Seek},
+    collections::BTreeMap,
+    io::{Read, Seek, SeekFrom},
+    ops::Range,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
-use zstd::bulk::Decompressor;
+use mcap::{
+    McapError,
+    records::{AttachmentHeader, MessageHeader, op},
+};
 
+use self::{
+    chunk::ChunkRecords,
+    records::{Records, Step},
+};
 use crate::{
     completeness::{Completeness, Defect},
-    container::{
-        MAGIC,
-        chunk::{InnerRecord, MessageView},
-        op,
-        scan::{Place, Scanner, Step},
-        summary::Summary,
-    },
     error::LogError,
     metadata::MetadataMap,
+    record::parse,
     topic::Topic,
 };
 
 /// What a log holds, in file order; the bytes are borrowed until the next step.
 #[derive(Debug)]
 pub(crate) enum Event<'a> {
-    /// A message of a whole chunk.
-    Message { chunk_at: u64, topic: Option<Topic>, channel: &'a str, message: MessageView<'a> },
+    /// A message; the chunk that holds it, or the message itself where it is in none, begins at `chunk_at`.
+    Message { chunk_at: u64, in_chunk: bool, topic: Option<Topic>, channel: &'a str, message: MessageView<'a> },
     /// A metadata record.
     Metadata { name: String, map: MetadataMap },
     /// An attachment.
-    Attachment { name: String, media_type: String, data: &'a [u8] },
+    Attachment { header: AttachmentHeader, data: &'a [u8] },
+}
+
+/// A message record.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MessageView<'a> {
+    pub(crate) header: MessageHeader,
+    pub(crate) log_time_ns: u64,
+    pub(crate) publish_time_ns: u64,
+    pub(crate) data: &'a [u8],
 }
 
 /// A channel as the file describes it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub(crate) struct Channel {
     pub(crate) name: String,
     pub(crate) schema: String,
     pub(crate) topic: Option<Topic>,
+    /// Messages met so far.
+    pub(crate) messages: u64,
+    pub(crate) definition: Arc<mcap::Channel<'static>>,
 }
 
 /// Where in the file the walk stands.
@@ -49,31 +67,26 @@ pub(crate) struct Channel {
 enum Section {
     Data,
     Summary,
+    Magic,
     Over,
 }
 
 /// The walk itself.
 pub(crate) struct Walk<R> {
     path: PathBuf,
-    scanner: Scanner<R>,
-    zstd: Decompressor<'static>,
+    records: Records<R>,
     section: Section,
-    /// The decompressed chunk under way: where it stands, its records, and the next one in it.
+    /// The chunk under way, where it stands, and the record of it that was read last.
+    chunk: ChunkRecords,
     chunk_at: u64,
-    records: Vec<u8>,
-    offset: usize,
+    content: Vec<u8>,
     /// Channels by number; messages look theirs up in here.
     channels: Vec<Option<Channel>>,
-    schema_names: Vec<Option<String>>,
-    counts: Vec<u64>,
+    schemas: BTreeMap<u16, Arc<mcap::Schema<'static>>>,
     library: String,
-    summary: Summary,
-    crc: crc32fast::Hasher,
     completeness: Completeness,
     /// Where the whole records of the data section end.
     data_end_at: u64,
-    /// Message indexes belong to the chunk right before them.
-    after_chunk: bool,
     stated_messages: Option<u64>,
     /// Whether footer and end magic stand where they should.
     has_end: bool,
@@ -81,36 +94,30 @@ pub(crate) struct Walk<R> {
 
 impl<R: Read + Seek> Walk<R> {
     /// Starts at the beginning of `source`, of `file_bytes` bytes.
-    pub(crate) fn new(source: R, file_bytes: u64, path: &Path) -> Result<Self, LogError> {
-        let mut scanner = Scanner::new(source, 0, file_bytes);
+    pub(crate) fn new(mut source: R, file_bytes: u64, path: &Path) -> Result<Self, LogError> {
         let io = |source| LogError::Io { action: "read", path: path.to_owned(), source };
-        let magic = scanner.raw::<{ MAGIC.len() }>().map_err(io)?;
-        if magic.as_ref() != Some(MAGIC) {
-            let found = match magic {
-                Some(bytes) => format!("\"{}\"", bytes.escape_ascii()),
-                None => format!("{file_bytes} bytes only"),
+        source.seek(SeekFrom::Start(0)).map_err(io)?;
+        let mut magic = Vec::new();
+        source.by_ref().take(mcap::MAGIC.len() as u64).read_to_end(&mut magic).map_err(io)?;
+        if magic != mcap::MAGIC {
+            let found = match magic.len() == mcap::MAGIC.len() {
+                true => format!("\"{}\"", magic.escape_ascii()),
+                false => format!("{file_bytes} bytes only"),
             };
             return Err(LogError::NotMcap { path: path.to_owned(), found });
         }
-        let mut crc = crc32fast::Hasher::new();
-        crc.update(MAGIC);
         Ok(Self {
             path: path.to_owned(),
-            data_end_at: scanner.at(),
-            scanner,
-            zstd: Decompressor::new().map_err(io)?,
+            records: Records::new(source, file_bytes).map_err(io)?,
             section: Section::Data,
+            chunk: ChunkRecords::new(),
             chunk_at: 0,
-            records: Vec::new(),
-            offset: 0,
+            content: Vec::new(),
             channels: Vec::new(),
-            schema_names: Vec::new(),
-            counts: Vec::new(),
+            schemas: BTreeMap::new(),
             library: String::new(),
-            summary: Summary::default(),
-            crc,
             completeness: Completeness::Complete,
-            after_chunk: false,
+            data_end_at: mcap::MAGIC.len() as u64,
             stated_messages: None,
             has_end: false,
         })
@@ -130,14 +137,9 @@ impl<R: Read + Seek> Walk<R> {
         &self.library
     }
 
-    /// The channels met so far.
-    pub(crate) fn channels(&self) -> impl Iterator<Item = (u16, &Channel)> {
-        self.channels.iter().enumerate().filter_map(|(id, c)| Some((id as u16, c.as_ref()?)))
-    }
-
-    /// Messages met so far on a channel.
-    pub(crate) fn count(&self, id: u16) -> u64 {
-        self.counts.get(usize::from(id)).copied().unwrap_or(0)
+    /// The channels met so far, in the order of their numbers.
+    pub(crate) fn channels(&self) -> impl Iterator<Item = &Channel> {
+        self.channels.iter().flatten()
     }
 
     /// Where the whole records of the data end.
@@ -150,164 +152,147 @@ impl<R: Read + Seek> Walk<R> {
         self.has_end
     }
 
-    /// What the summary of the data read so far says.
-    pub(crate) fn into_summary(mut self) -> Summary {
-        for (id, &count) in self.counts.iter().enumerate().filter(|(_, count)| **count > 0) {
-            self.summary.add_message_count(id as u16, count);
-        }
-        self.summary
-    }
-
     /// The next message, metadata record or attachment; `None` at the end of what can be read.
     pub(crate) fn next(&mut self) -> Result<Option<Event<'_>>, LogError> {
         loop {
-            if let Some(inner) = self.next_inner() {
-                let message = MessageView {
-                    channel: inner.channel,
-                    log_time_ns: inner.log_time_ns,
-                    publish_time_ns: inner.publish_time_ns,
-                    data: &self.records[inner.data],
-                };
-                let channel = self.channels.get(usize::from(inner.channel)).and_then(Option::as_ref);
-                return Ok(Some(Event::Message {
-                    chunk_at: self.chunk_at,
-                    topic: inner.topic,
-                    channel: channel.map_or("", |channel| &channel.name),
-                    message,
-                }));
+            if let Some(found) = self.next_inner() {
+                return Ok(Some(self.event(found)));
             }
-            match self.section {
-                Section::Over => return Ok(None),
-                Section::Data => {
-                    if let Some(place) = self.step()?
-                        && let Some(found) = self.data_record(place)?
-                    {
+            if self.section == Section::Over {
+                return Ok(None);
+            }
+            match self.records.step().map_err(LogError::io("read", &self.path))? {
+                Step::Record(place) if self.section == Section::Data => {
+                    if let Some(found) = self.data_record(place)? {
                         return Ok(Some(self.event(found)));
                     }
                 }
-                Section::Summary => self.summary_record()?,
+                Step::Record(place) => self.summary_record(place),
+                Step::End => {
+                    self.section = Section::Over;
+                    self.has_end = true;
+                }
+                Step::Failed(error) => self.failed(&error)?,
             }
         }
     }
 
     /// The next message of the chunk under way. Schemas and channels in it are noted on the way.
-    fn next_inner(&mut self) -> Option<Inner> {
+    fn next_inner(&mut self) -> Option<Found> {
         loop {
-            let record = match InnerRecord::at(&self.records, self.offset) {
-                Ok(record) => record?,
-                Err(defect) => {
-                    self.leave_chunk(defect);
-                    return None;
-                }
+            let result = match self.chunk.next(&mut self.content) {
+                Ok(opcode) => match opcode? {
+                    op::MESSAGE => self.message().map(Some),
+                    opcode @ (op::SCHEMA | op::CHANNEL) => {
+                        let content = std::mem::take(&mut self.content);
+                        let result = parse(opcode, &content).map(|record| self.describe(record));
+                        self.content = content;
+                        result.map(|()| None)
+                    }
+                    _ => Ok(None),
+                },
+                Err(defect) => Err(defect),
             };
-            let (opcode, next) = (record.opcode, record.next);
-            let content_at = next - record.content.len();
-            let result = match opcode {
-                op::MESSAGE => self.message(content_at, next).map(Some),
-                op::SCHEMA | op::CHANNEL => {
-                    let content = self.records[content_at..next].to_vec();
-                    self.describe(opcode, &content).map(|()| None)
-                }
-                _ => Ok(None),
-            };
-            self.offset = next;
             match result {
-                Ok(Some(message)) => return Some(message),
                 Ok(None) => {}
+                Ok(found) => return found,
                 Err(defect) => {
-                    self.leave_chunk(defect);
+                    self.completeness.add_damage(self.chunk_at, defect);
+                    self.chunk.leave();
                     return None;
                 }
             }
         }
     }
 
-    fn leave_chunk(&mut self, defect: Defect) {
-        self.completeness.add_damage(self.chunk_at, defect);
-        self.records.clear();
-        self.offset = 0;
-    }
-
-    /// Counts the message whose content stands at `from..to` of the chunk, and links it to its topic.
-    fn message(&mut self, from: usize, to: usize) -> Result<Inner, Defect> {
-        let message = MessageView::parse(&self.records[from..to])?;
-        let id = usize::from(message.channel);
-        let Some(Some(channel)) = self.channels.get(id) else {
-            return Err(Defect::UnknownChannel { channel: message.channel });
-        };
-        self.counts[id] += 1;
-        Ok(Inner {
-            topic: channel.topic,
-            channel: message.channel,
-            log_time_ns: message.log_time_ns,
-            publish_time_ns: message.publish_time_ns,
-            data: to - message.data.len()..to,
-        })
-    }
-
-    /// Reads a record of the data section; `None` where something else happened.
-    fn step(&mut self) -> Result<Option<Place>, LogError> {
-        let at = self.scanner.at();
-        match self.scanner.step() {
-            Ok(Step::Record(place)) => {
-                if place.opcode != op::DATA_END {
-                    self.crc.update(self.scanner.head());
-                    self.crc.update(self.scanner.content());
-                }
-                return Ok(Some(place));
+    /// The reader does not get over what stands at its place: over a wrong checksum it is helped, behind other
+    /// damage it starts anew.
+    fn failed(&mut self, error: &McapError) -> Result<(), LogError> {
+        let at = self.records.at();
+        let defect = self.records.defect(error).map_err(LogError::io("read", &self.path))?;
+        match (self.section, error) {
+            (_, McapError::BadDataCrc { .. } | McapError::BadSummaryCrc { .. }) => {
+                self.completeness.add_damage(at, defect);
+                self.restart(at)?;
             }
-            Ok(Step::End) => {
-                self.completeness.add_truncation(at, Defect::NoEnd);
+            (Section::Data, _) if defect != Defect::NoEnd => self.lost(at, defect)?,
+            (Section::Magic, McapError::BadMagic) => {
                 self.section = Section::Over;
+                self.completeness.add_damage(at, Defect::Malformed { record: "file", field: "end magic" });
             }
-            Ok(Step::Lost(defect)) => self.lost(at, defect)?,
-            Err(error) => self.read_error(at, error)?,
+            (Section::Magic, McapError::BytesAfterEndMagic) => {
+                (self.section, self.has_end) = (Section::Over, true);
+                let at = at + mcap::MAGIC.len() as u64;
+                self.completeness.add_damage(at, Defect::Trailing { bytes: self.records.file_bytes() - at });
+            }
+            (Section::Magic, _) => {
+                self.section = Section::Over;
+                self.completeness.add_truncation(at, Defect::NoEnd);
+            }
+            _ => {
+                self.section = Section::Over;
+                self.completeness.add_truncation(at, defect);
+            }
         }
-        Ok(None)
-    }
-
-    /// A file that shrinks under its reader is cut; any other error is the disk's.
-    fn read_error(&mut self, at: u64, error: io::Error) -> Result<(), LogError> {
-        self.section = Section::Over;
-        if error.kind() != io::ErrorKind::UnexpectedEof {
-            return Err(LogError::io("read", &self.path)(error));
-        }
-        self.completeness.add_truncation(at, Defect::NoEnd);
         Ok(())
     }
 
     /// No whole record stands at `at`: a chunk further on shows that this is damage and not the end.
     fn lost(&mut self, at: u64, defect: Defect) -> Result<(), LogError> {
-        if self.scanner.resync(at + 1).map_err(LogError::io("read", &self.path))? {
-            self.completeness.add_damage(at, defect);
-        } else {
-            self.completeness.add_truncation(at, defect);
-            self.section = Section::Over;
+        let file_bytes = self.records.file_bytes();
+        let next = resync::next_chunk(self.records.source(), at + 1, file_bytes);
+        match next.map_err(LogError::io("read", &self.path))? {
+            Some(next) => {
+                self.completeness.add_damage(at, defect);
+                self.restart(next)?;
+            }
+            None => {
+                self.completeness.add_truncation(at, defect);
+                self.section = Section::Over;
+            }
         }
         Ok(())
     }
 
+    fn restart(&mut self, at: u64) -> Result<(), LogError> {
+        self.records.restart(at).map_err(LogError::io("read", &self.path))
+    }
+
     fn event(&self, found: Found) -> Event<'_> {
         match found {
+            Found::Message(header, data_at) => {
+                let channel = self.channels.get(usize::from(header.channel_id)).and_then(Option::as_ref);
+                Event::Message {
+                    chunk_at: self.chunk_at,
+                    in_chunk: self.chunk.is_open(),
+                    topic: channel.and_then(|channel| channel.topic),
+                    channel: channel.map_or("", |channel| &channel.name),
+                    message: MessageView {
+                        header,
+                        log_time_ns: header.log_time,
+                        publish_time_ns: header.publish_time,
+                        data: &self.content[data_at..],
+                    },
+                }
+            }
             Found::Metadata(name, map) => Event::Metadata { name, map },
-            Found::Attachment(name, media_type, data) => {
-                Event::Attachment { name, media_type, data: &self.scanner.content()[data] }
+            Found::Attachment(Attached { header, data }) => {
+                Event::Attachment { header, data: &self.records.content()[data] }
             }
         }
     }
 }
 
-/// A message of the chunk under way, without its borrowed bytes.
-struct Inner {
-    topic: Option<Topic>,
-    channel: u16,
-    log_time_ns: u64,
-    publish_time_ns: u64,
-    data: std::ops::Range<usize>,
+/// What the caller sees, without its borrowed bytes.
+enum Found {
+    /// The message's data begins there in the record under way.
+    Message(MessageHeader, usize),
+    Metadata(String, MetadataMap),
+    Attachment(Attached),
 }
 
-/// A record that the caller sees, without its borrowed bytes.
-enum Found {
-    Metadata(String, MetadataMap),
-    Attachment(String, String, std::ops::Range<usize>),
+/// An attachment and where its data lies in its record.
+struct Attached {
+    header: AttachmentHeader,
+    data: Range<usize>,
 }

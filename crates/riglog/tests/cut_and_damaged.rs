@@ -141,9 +141,14 @@ fn a_damaged_chunk_costs_that_chunk_alone() {
         );
         // 100 ms of this log: a batch of angles and the bins of a twelfth of a turn.
         assert!((1..=70).contains(&lost), "byte {place}: {lost} messages lost");
-        // Without its end the file is finalised all the same; the damage stays where it is, out of the index.
+        // Without its end the file is finalised all the same; what the damage covers stays in the file kept beside it.
         std::fs::write(&path, &bad[..bad.len() - 100]).unwrap();
         let recovery = recover(&path).unwrap();
+        assert!(matches!(recovery.found, Completeness::Damaged { .. }));
+        let kept = path.with_extension("mcap.damaged");
+        assert_eq!(std::fs::read(&kept).unwrap(), &bad[..bad.len() - 100]);
+        std::fs::remove_file(kept).unwrap();
+        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1, "nothing else is left behind");
         assert_eq!(recovery.kept_messages, messages(&records));
         let recovered = std::fs::read(&path).unwrap();
         assert_eq!(messages(&read(&recovered).unwrap().0), messages(&records));

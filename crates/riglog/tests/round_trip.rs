@@ -219,9 +219,11 @@ fn the_public_reader_sees_the_same_messages_and_summary() {
 }
 
 #[test]
-fn logs_of_another_writer_are_read_chunked_or_not() {
-    for use_chunks in [true, false] {
-        let mut out = mcap::WriteOptions::new().use_chunks(use_chunks).create(Cursor::new(Vec::new())).unwrap();
+fn logs_of_another_writer_are_read_chunked_or_not_and_however_compressed() {
+    let (zstd, lz4) = (Some(mcap::Compression::Zstd), Some(mcap::Compression::Lz4));
+    for (use_chunks, compression) in [(true, zstd), (true, lz4), (true, None), (false, None)] {
+        let options = mcap::WriteOptions::new().use_chunks(use_chunks).compression(compression);
+        let mut out = options.create(Cursor::new(Vec::new())).unwrap();
         let topic = riglog::Topic::Angles;
         let schema = out.add_schema(topic.schema(), "protobuf", topic.descriptors()).unwrap();
         let channel = out.add_channel(schema, topic.name(), "protobuf", &BTreeMap::new()).unwrap();
@@ -246,6 +248,6 @@ fn logs_of_another_writer_are_read_chunked_or_not() {
         assert_eq!(records.len(), 100);
         assert!(matches!(&records[98], Record::Angles { batch, publish_time_ns: 8, .. } if batch.first_sample == 98));
         assert_eq!(records[99], Record::Unknown { topic: "/camera".into() });
-        assert_eq!(reader.completeness(), Some(&Completeness::Complete), "chunks: {use_chunks}");
+        assert_eq!(reader.completeness(), Some(&Completeness::Complete), "{use_chunks} {compression:?}");
     }
 }

@@ -10,13 +10,12 @@ use super::{
     store::{Store, Tail},
     sync::Syncer,
 };
-use crate::{container::summary::Summary, error::LogError};
+use crate::error::LogError;
 
-/// A file that grows by whole records, and the summary of them.
+/// A file that grows by whole records.
 pub(super) struct Output {
     path: PathBuf,
     tail: Tail,
-    summary: Summary,
     syncer: Syncer,
     sync_period: Duration,
     synced_at: Instant,
@@ -24,11 +23,10 @@ pub(super) struct Output {
     failure: Option<Failure>,
 }
 
-/// A failed write, kept for another try at the end.
+/// What a failed write did not write, kept for another try at the end.
 struct Failure {
-    source: io::Error,
     records: Vec<u8>,
-    summary: Summary,
+    messages: u64,
 }
 
 impl Output {
@@ -42,7 +40,6 @@ impl Output {
         Ok(Self {
             path: path.to_owned(),
             tail: Tail::new(store),
-            summary: Summary::default(),
             syncer: Syncer::new(sync).map_err(LogError::io("start a thread to sync", path))?,
             sync_period,
             synced_at: Instant::now(),
@@ -60,10 +57,6 @@ impl Output {
         self.tail.at_byte()
     }
 
-    pub(super) fn summary(&self) -> &Summary {
-        &self.summary
-    }
-
     pub(super) fn has_failed(&self) -> bool {
         self.failure.is_some()
     }
@@ -76,18 +69,17 @@ impl Output {
         }
     }
 
-    /// Hands whole records to the operating system; `summary` tells what they hold.
-    pub(super) fn hand_over(&mut self, records: Vec<u8>, summary: Summary) -> Result<(), LogError> {
+    /// Hands whole records, with so many messages in them, to the operating system.
+    pub(super) fn hand_over(&mut self, records: Vec<u8>, messages: u64) -> Result<(), LogError> {
         match self.tail.append(&records) {
             Ok(()) => {
-                self.summary.append(summary);
                 self.dirty = true;
                 Ok(())
             }
             Err(source) => {
-                let error = self.write_error(records.len(), copy_of(&source));
-                self.failure = Some(Failure { source, records, summary });
-                Err(error)
+                let wanted_bytes = records.len();
+                self.failure = Some(Failure { records, messages });
+                Err(self.write_error(wanted_bytes, source))
             }
         }
     }
@@ -107,24 +99,30 @@ impl Output {
         Ok(())
     }
 
+    /// Tries once more what could not be written.
+    ///
+    /// Where it still cannot, the file stays without an end, which would speak of what is missing; the next start
+    /// gives it one.
+    pub(super) fn retry(&mut self) -> Result<(), LogError> {
+        let Some(Failure { records, messages }) = self.failure.take() else { return Ok(()) };
+        let Err(source) = self.tail.append(&records) else { return Ok(()) };
+        self.syncer.request();
+        // Of two errors the first is the one to act on.
+        let _ = self.syncer.finish();
+        Err(LogError::Incomplete {
+            path: self.path.clone(),
+            lost_messages: messages,
+            at_byte: self.tail.at_byte(),
+            wanted_bytes: records.len() as u64,
+            source,
+        })
+    }
+
     /// Writes the end and waits until all is on the disk.
-    pub(super) fn finish(&mut self) -> Result<(), LogError> {
-        let lost = self.failure.take().and_then(|failure| self.retry(failure));
-        let end = self.summary.encode_end(self.tail.at_byte(), self.tail.crc());
-        let at_byte = self.tail.at_byte();
-        let ended = self.tail.append(&end);
+    pub(super) fn finish(&mut self, end: &[u8]) -> Result<(), LogError> {
+        let ended = self.tail.append(end);
         self.syncer.request();
         let not_synced = self.syncer.finish();
-        if let Some(Failure { source, records, summary }) = lost {
-            return Err(LogError::Incomplete {
-                path: self.path.clone(),
-                lost_messages: summary.messages(),
-                at_byte,
-                wanted_bytes: records.len() as u64,
-                finalised: ended.is_ok(),
-                source,
-            });
-        }
         ended.map_err(|source| self.write_error(end.len(), source))?;
         match not_synced {
             Some(source) => Err(LogError::io("sync", &self.path)(source)),
@@ -132,25 +130,8 @@ impl Output {
         }
     }
 
-    /// Tries once more what could not be written; returns what still cannot.
-    fn retry(&mut self, failure: Failure) -> Option<Failure> {
-        let Failure { records, summary, .. } = failure;
-        match self.tail.append(&records) {
-            Ok(()) => {
-                self.summary.append(summary);
-                None
-            }
-            Err(source) => Some(Failure { source, records, summary }),
-        }
-    }
-
     fn write_error(&self, wanted_bytes: usize, source: io::Error) -> LogError {
         let (path, at_byte) = (self.path.clone(), self.tail.at_byte());
         LogError::Write { path, at_byte, wanted_bytes: wanted_bytes as u64, source }
     }
-}
-
-/// The same error once more: one for the caller, one for the end of the log.
-fn copy_of(error: &io::Error) -> io::Error {
-    error.raw_os_error().map_or_else(|| error.kind().into(), io::Error::from_raw_os_error)
 }

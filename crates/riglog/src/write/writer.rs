@@ -4,28 +4,27 @@ use std::{
     fs::{File, OpenOptions},
     io,
     path::Path,
+    sync::Arc,
     time::{Duration, Instant},
 };
 
+use mcap::{
+    Attachment, McapResult,
+    records::{MessageHeader, Metadata},
+};
 use prost::Message;
 
 use super::{
+    encoder::{Encoder, io_error},
     options::{LogStatistics, WriterOptions},
     output::Output,
     store::Store,
 };
 use crate::{
-    container::{
-        bytes::Put,
-        chunk::{ChunkBuilder, ChunkCompressor},
-        head::encode_head,
-        op,
-        summary::{AttachmentIndex, MetadataIndex, Summary},
-    },
     error::LogError,
     metadata::{EncoderMetadata, MetadataMap, RunMetadata, SEALED, SEALED_KEY},
     proto::{AngleBatch, Backlash, Level, RigState, Timestamp, TransmissionError, foxglove},
-    topic::Topic,
+    topic::{ENCODING, Topic},
 };
 
 /// The largest message, text or file that is accepted: far above any that a rig has, far below what readers refuse.
@@ -40,12 +39,42 @@ const MAX_CONTENT_BYTES: usize = 64 << 20;
 pub struct LogWriter {
     options: WriterOptions,
     output: Output,
-    codec: ChunkCompressor,
-    chunk: ChunkBuilder,
-    /// When the chunk under way got its first message.
-    chunk_since: Instant,
+    encoder: Encoder,
+    chunk: Chunk,
+    /// The message under way, encoded.
+    encoded: Vec<u8>,
     sequences: [u32; Topic::ALL.len()],
     samples: u64,
+}
+
+/// The chunk under way.
+struct Chunk {
+    messages: u64,
+    /// Size of its messages, before compression.
+    bytes: usize,
+    /// When it got its first message, by the messages' clock and by ours.
+    first_log_time_ns: u64,
+    since: Instant,
+}
+
+impl Chunk {
+    fn empty() -> Self {
+        Self { messages: 0, bytes: 0, first_log_time_ns: 0, since: Instant::now() }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.messages == 0
+    }
+
+    fn add(&mut self, log_time_ns: u64, data_bytes: usize) {
+        /// Opcode, length, channel, sequence and two times.
+        const MESSAGE_HEAD_BYTES: usize = 1 + 8 + 2 + 4 + 8 + 8;
+        if self.is_empty() {
+            (self.first_log_time_ns, self.since) = (log_time_ns, Instant::now());
+        }
+        self.messages += 1;
+        self.bytes += MESSAGE_HEAD_BYTES + data_bytes;
+    }
 }
 
 impl LogWriter {
@@ -78,23 +107,18 @@ impl LogWriter {
         sync: impl FnMut() -> io::Result<()> + Send + 'static,
         options: WriterOptions,
     ) -> Result<Self, LogError> {
-        let codec = ChunkCompressor::new(options.compression_level).map_err(|source| LogError::Compress {
-            path: path.to_owned(),
-            bytes: 0,
-            source,
-        })?;
+        let mut encoder = Encoder::new(&options.library, options.compression_level, channels())
+            .map_err(|error| LogError::Compress { path: path.to_owned(), bytes: 0, source: io_error(error) })?;
         let sync_period = Duration::from_millis(options.sync_period_ms.into());
         let mut output = Output::new(path, store, sync, sync_period)?;
-        let mut summary = Summary::default();
-        let head = encode_head(&options.library, &mut summary);
-        output.hand_over(head, summary)?;
+        output.hand_over(encoder.take(), 0)?;
         output.request_sync();
         Ok(Self {
             options,
             output,
-            codec,
-            chunk: ChunkBuilder::default(),
-            chunk_since: Instant::now(),
+            encoder,
+            chunk: Chunk::empty(),
+            encoded: Vec::new(),
             sequences: [0; Topic::ALL.len()],
             samples: 0,
         })
@@ -197,29 +221,14 @@ impl LogWriter {
     /// The content is larger than 64 MiB, or the operating system refused.
     pub fn attach(&mut self, log_time_ns: u64, name: &str, media_type: &str, data: &[u8]) -> Result<(), LogError> {
         self.check_size("an attachment", name.len() + media_type.len() + data.len())?;
-        self.begin_lone_record()?;
-        let mut record = Vec::with_capacity(data.len() + 256);
-        record.put_record(op::ATTACHMENT, |out| {
-            let content_at = out.len();
-            out.put_u64(log_time_ns);
-            out.put_u64(log_time_ns);
-            out.put_str(name);
-            out.put_str(media_type);
-            out.put_u64(data.len() as u64);
-            out.extend_from_slice(data);
-            let crc = crc32fast::hash(&out[content_at..]);
-            out.put_u32(crc);
-        });
-        let index = AttachmentIndex {
-            offset: self.output.at_byte(),
-            length: record.len() as u64,
-            log_time_ns,
-            create_time_ns: log_time_ns,
-            data_size: data.len() as u64,
+        let attachment = Attachment {
+            log_time: log_time_ns,
+            create_time: log_time_ns,
             name: name.to_owned(),
             media_type: media_type.to_owned(),
+            data: data.into(),
         };
-        self.output.hand_over(record, Summary { attachments: vec![index], ..Default::default() })
+        self.lone_record(|encoder| encoder.attachment(&attachment))
     }
 
     /// Closes a chunk that is due by wall time and syncs what is due; to be called when idle, a few times in a
@@ -230,7 +239,7 @@ impl LogWriter {
     pub fn tick(&mut self) -> Result<(), LogError> {
         self.output.check_open()?;
         let due = Duration::from_millis(self.options.chunk_period_ms.into());
-        if !self.chunk.is_empty() && self.chunk_since.elapsed() >= due {
+        if !self.chunk.is_empty() && self.chunk.since.elapsed() >= due {
             self.close_chunk()?;
         }
         self.output.sync_if_due()
@@ -249,15 +258,17 @@ impl LogWriter {
             false => self.close_chunk().err(),
         };
         // What the disk refused is tried again and told by this; what was not even compressed is told after it.
-        self.output.finish()?;
+        self.output.retry()?;
         if let Some(error @ LogError::Compress { .. }) = unclosed {
             return Err(error);
         }
+        let (end, summary) = self.encoder.finish().map_err(|error| self.compress_error(error))?;
+        self.output.finish(&end)?;
         Ok(LogStatistics {
             path: self.output.path().to_owned(),
-            messages: self.output.summary().messages(),
+            messages: summary.stats.map_or(0, |statistics| statistics.message_count),
             samples: self.samples,
-            chunks: self.output.summary().chunks.len() as u64,
+            chunks: summary.chunk_indexes.len() as u64,
             bytes: self.output.at_byte(),
         })
     }
@@ -273,17 +284,19 @@ impl LogWriter {
         self.check_size("a message", message.encoded_len())?;
         let period_ns = u64::from(self.options.chunk_period_ms) * 1_000_000;
         // The message that would make a chunk longer than its period opens the next one.
-        if !self.chunk.is_empty() && log_time_ns.saturating_sub(self.chunk.first_log_time_ns()) >= period_ns {
+        if !self.chunk.is_empty() && log_time_ns.saturating_sub(self.chunk.first_log_time_ns) >= period_ns {
             self.close_chunk()?;
         }
-        if self.chunk.is_empty() {
-            self.chunk_since = Instant::now();
-        }
+        self.encoded.clear();
+        message.encode_raw(&mut self.encoded);
         let sequence = &mut self.sequences[topic as usize];
-        self.chunk.add(topic.id(), *sequence, log_time_ns, publish_time_ns, |out| message.encode_raw(out));
+        let (channel_id, log_time, publish_time) = (topic.id(), log_time_ns, publish_time_ns);
+        let header = MessageHeader { channel_id, sequence: *sequence, log_time, publish_time };
         *sequence = sequence.wrapping_add(1);
+        self.encoder.message(&header, &self.encoded).map_err(|error| self.compress_error(error))?;
+        self.chunk.add(log_time_ns, self.encoded.len());
         let due = Duration::from_millis(self.options.chunk_period_ms.into());
-        if self.chunk.bytes() >= self.options.chunk_bytes || self.chunk_since.elapsed() >= due {
+        if self.chunk.bytes >= self.options.chunk_bytes || self.chunk.since.elapsed() >= due {
             self.close_chunk()?;
         }
         self.output.sync_if_due()
@@ -291,15 +304,8 @@ impl LogWriter {
 
     fn metadata(&mut self, name: &'static str, map: &MetadataMap) -> Result<(), LogError> {
         self.check_size("a metadata record", map.iter().map(|(key, value)| key.len() + value.len()).sum())?;
-        self.begin_lone_record()?;
-        let mut record = Vec::new();
-        record.put_record(op::METADATA, |out| {
-            out.put_str(name);
-            out.put_map(map);
-        });
-        let (offset, length) = (self.output.at_byte(), record.len() as u64);
-        let index = MetadataIndex { offset, length, name: name.to_owned() };
-        self.output.hand_over(record, Summary { metadata: vec![index], ..Default::default() })
+        let metadata = Metadata { name: name.to_owned(), metadata: map.clone() };
+        self.lone_record(|encoder| encoder.metadata(&metadata))
     }
 
     fn check_size(&self, what: &'static str, bytes: usize) -> Result<(), LogError> {
@@ -310,24 +316,42 @@ impl LogWriter {
     }
 
     /// Records outside of chunks follow the messages that were given before them.
-    fn begin_lone_record(&mut self) -> Result<(), LogError> {
+    fn lone_record(&mut self, add: impl FnOnce(&mut Encoder) -> McapResult<()>) -> Result<(), LogError> {
         self.output.check_open()?;
-        if self.chunk.is_empty() { Ok(()) } else { self.close_chunk() }
+        if !self.chunk.is_empty() {
+            self.close_chunk()?;
+        }
+        add(&mut self.encoder).map_err(|error| self.compress_error(error))?;
+        self.output.hand_over(self.encoder.take(), 0)
     }
 
     /// Compresses the chunk under way and hands it over with its indexes.
     fn close_chunk(&mut self) -> Result<(), LogError> {
-        let mut records = Vec::new();
-        let index = self
-            .chunk
-            .encode(&mut self.codec, self.output.at_byte(), &mut records)
-            .map_err(|source| LogError::Compress { path: self.path().to_owned(), bytes: self.chunk.bytes(), source })?;
-        let mut summary = Summary { chunks: vec![index], ..Default::default() };
-        summary.widen(self.chunk.bounds_ns());
-        self.chunk.counts().for_each(|(channel, messages)| summary.add_message_count(channel, messages));
-        self.chunk.clear();
-        self.output.hand_over(records, summary)
+        self.encoder.close_chunk().map_err(|error| self.compress_error(error))?;
+        let messages = std::mem::replace(&mut self.chunk, Chunk::empty()).messages;
+        self.output.hand_over(self.encoder.take(), messages)
     }
+
+    fn compress_error(&self, error: mcap::McapError) -> LogError {
+        LogError::Compress { path: self.path().to_owned(), bytes: self.chunk.bytes, source: io_error(error) }
+    }
+}
+
+/// The channels of a rig log, each with a schema of its own number.
+fn channels() -> Vec<Arc<mcap::Channel<'static>>> {
+    let channel = |topic: Topic| mcap::Channel {
+        id: topic.id(),
+        topic: topic.name().to_owned(),
+        schema: Some(Arc::new(mcap::Schema {
+            id: topic.id(),
+            name: topic.schema().to_owned(),
+            encoding: ENCODING.to_owned(),
+            data: topic.descriptors().into(),
+        })),
+        message_encoding: ENCODING.to_owned(),
+        metadata: MetadataMap::new(),
+    };
+    Topic::ALL.into_iter().map(|topic| Arc::new(channel(topic))).collect()
 }
 
 impl Drop for LogWriter {
@@ -340,9 +364,9 @@ impl Drop for LogWriter {
     }
 }
 
-/// Makes the new file's name survive a power cut. Where a file system does not sync directories, nothing is lost
+/// Makes a new file's name survive a power cut. Where a file system does not sync directories, nothing is lost
 /// but that.
-fn sync_directory_of(path: &Path) {
+pub(crate) fn sync_directory_of(path: &Path) {
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
     if let Ok(directory) = File::open(parent.unwrap_or(Path::new("."))) {
         let _ = directory.sync_all();
@@ -436,7 +460,7 @@ mod tests {
                 assert_eq!(texts(&disk.bytes()), (["a", "b"].map(str::to_owned).to_vec(), Completeness::Complete));
             } else {
                 let error = log.finish().unwrap_err();
-                assert!(matches!(error, LogError::Incomplete { lost_messages: 1, finalised: false, .. }), "{error}");
+                assert!(matches!(error, LogError::Incomplete { lost_messages: 1, .. }), "{error}");
                 let (seen, completeness) = texts(&disk.bytes());
                 assert_eq!(seen, ["a"]);
                 assert!(matches!(completeness, Completeness::Truncated { .. }));
