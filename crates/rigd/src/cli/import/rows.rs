@@ -83,7 +83,7 @@ const NS_PER_S: u64 = 1_000_000_000;
 fn seconds_ns(value_s: f64) -> Option<u64> {
     let ns = (value_s * NS_PER_S as f64).round();
     // 2⁶³ ns are 292 years.
-    (ns >= 0.0 && ns < 9.2e18).then_some(ns as u64)
+    (0.0..9.2e18).contains(&ns).then_some(ns as u64)
 }
 
 /// A decimal number of seconds in ns without the rounding of an f64, which is 0.1 µs at today's Unix time.

@@ -86,7 +86,10 @@ pub fn run(args: &Args) -> Result<(), ModelError> {
             points: points(&theta1_rad, values_rad),
         })
         .collect();
-    let panel = Panel::over_turn(format!("Backlash at the driven shaft, {load_nm} N·m"), "backlash / µrad", series);
+    let panel = Panel {
+        x: args.sampling.into(),
+        ..Panel::over_turn(format!("Backlash at the driven shaft, {load_nm} N·m"), "backlash / µrad", series)
+    };
     let report = Report { text, json, table: Table { columns }, chart: Chart { panels: vec![panel] } };
     Ok(args.output.deliver(report, &[])?)
 }

@@ -64,6 +64,9 @@ pub fn run(args: &Args) -> Result<Exit, ModelError> {
         findings.extend(teeth(&pair.model.pair, &theta1_rad));
         findings.extend(contact(&pair, &theta1_rad, &mut chart)?);
     }
+    for panel in &mut chart.panels {
+        panel.x = args.sampling.into();
+    }
     let faults: Vec<&Finding> = findings.iter().filter(|finding| !finding.ok).collect();
 
     // A fault's whole sentence runs over its column instead of widening all.
@@ -137,12 +140,12 @@ fn kinematics(pair: &GearPair) -> Vec<Finding> {
     findings
 }
 
-/// Lowest of a function over angles and where.
+/// Lowest of a function over angles and where: of equals to rounding the first.
 fn lowest(theta1_rad: &[f64], value: impl Fn(f64) -> f64) -> (f64, f64) {
-    theta1_rad
-        .iter()
-        .map(|theta| (value(*theta), *theta))
-        .fold((f64::INFINITY, f64::NAN), |best, one| if one.0 < best.0 { one } else { best })
+    theta1_rad.iter().map(|theta| (value(*theta), *theta)).fold((f64::INFINITY, f64::NAN), |best, one| {
+        let clearly = best.0 - one.0 > 1e-9 * one.0.abs();
+        if clearly { one } else { best }
+    })
 }
 
 /// What the rack can cut.

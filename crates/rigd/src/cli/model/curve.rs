@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::error::{ModelError, check_count};
+use crate::chart::Axis;
 use crate::present::{angle, arcsec};
 
 /// Where over θ1.
@@ -29,6 +30,13 @@ impl Sampling {
         let turns = check_count("--turns", self.turns.into(), (1, 10_000))?;
         let all = check_count("--points times --turns", points * turns, (4, 10_000_000))?;
         Ok((0..all).map(|n| TAU * n as f64 / points as f64).collect())
+    }
+}
+
+// A picture's axis over these angles.
+impl From<Sampling> for Axis {
+    fn from(sampling: Sampling) -> Self {
+        if sampling.turns > 1 { Self::Fitted("θ1 / °".into()) } else { Self::Turn }
     }
 }
 

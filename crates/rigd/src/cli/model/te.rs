@@ -107,7 +107,10 @@ pub fn run(args: &Args) -> Result<(), ModelError> {
             points: points(&theta1_rad, &curve.values_rad),
         })
         .collect();
-    let panel = Panel::over_turn(format!("Transmission error at {load_nm} N·m"), "TE / µrad", series);
+    let panel = Panel {
+        x: args.sampling.into(),
+        ..Panel::over_turn(format!("Transmission error at {load_nm} N·m"), "TE / µrad", series)
+    };
     let report = Report { text, json, table: Table { columns }, chart: Chart { panels: vec![panel] } };
     Ok(args.output.deliver(report, &[])?)
 }
