@@ -14,7 +14,7 @@ pub enum GeometryError {
     },
 
     /// A number lies outside what a gear can have.
-    #[error("{quantity} = {value} {unit} is outside {lower} to {upper} {unit}: {advice}")]
+    #[error("{quantity} = {value}{u} is outside {lower} to {upper}{u}: {advice}", u = spaced(unit))]
     OutOfRange {
         /// What was given.
         quantity: &'static str,
@@ -98,7 +98,7 @@ pub enum GeometryError {
 
     /// A pitch curve that a rack cannot roll on.
     #[error(
-        "the pitch curve of gear {gear} is concave at theta1 = {theta1_rad:.6} rad (radius of curvature {radius_mm:.3} mm):          no rack or hob reaches it; shape or erode the gear, or take a rounder curve"
+        "the pitch curve of gear {gear} is concave at theta1 = {theta1_rad:.6} rad (radius of curvature {radius_mm:.3} mm): no rack or hob reaches it; shape or erode the gear, or take a rounder curve"
     )]
     Concave {
         /// 1 = driver, 2 = driven.
@@ -111,7 +111,7 @@ pub enum GeometryError {
 
     /// The rack cuts away the foot of its own flank.
     #[error(
-        "gear {gear} is undercut at theta1 = {theta1_rad:.6} rad: radius of curvature {radius_mm:.3} mm of the pitch curve is          below the limit {limit_mm:.3} mm = addendum/sin^2(pressure angle); take more teeth, a rounder curve, a larger          pressure angle or a smaller addendum"
+        "gear {gear} is undercut at theta1 = {theta1_rad:.6} rad: radius of curvature {radius_mm:.3} mm of the pitch curve is below the limit {limit_mm:.3} mm = addendum/sin^2(pressure angle); take more teeth, a rounder curve, a larger pressure angle or a smaller addendum"
     )]
     Undercut {
         /// 1 = driver, 2 = driven.
@@ -126,7 +126,7 @@ pub enum GeometryError {
 
     /// A tooth whose flanks meet before its tip.
     #[error(
-        "a tooth of gear {gear} cut at theta1 = {theta1_rad:.6} rad is {thickness_mm:.3} mm thick at its tip, below the limit          {limit_mm:.3} mm; take a smaller addendum or pressure angle, or less backlash"
+        "a tooth of gear {gear} cut at theta1 = {theta1_rad:.6} rad is {thickness_mm:.3} mm thick at its tip, below the limit {limit_mm:.3} mm; take a smaller addendum or pressure angle, or less backlash"
     )]
     Pointed {
         /// 1 = driver, 2 = driven.
@@ -141,7 +141,7 @@ pub enum GeometryError {
 
     /// The tooth spaces reach the shaft.
     #[error(
-        "the tooth spaces of gear {gear} reach its axis at theta1 = {theta1_rad:.6} rad: pitch radius {radius_mm:.3} mm,          dedendum {dedendum_mm:.3} mm; take more teeth or a rounder curve"
+        "the tooth spaces of gear {gear} reach its axis at theta1 = {theta1_rad:.6} rad: pitch radius {radius_mm:.3} mm, dedendum {dedendum_mm:.3} mm; take more teeth or a rounder curve"
     )]
     NoRoot {
         /// 1 = driver, 2 = driven.
@@ -169,7 +169,7 @@ pub enum GeometryError {
 
     /// A curve whose mate does not repeat after its own turn.
     #[error(
-        "harmonic {order} does not fit {teeth1} : {teeth2} teeth: the mate closes only if every harmonic is a multiple of          {needed}; take equal teeth, or harmonics that repeat {needed} times a turn"
+        "harmonic {order} does not fit {teeth1} : {teeth2} teeth: the mate closes only if every harmonic is a multiple of {needed}; take equal teeth, or harmonics that repeat {needed} times a turn"
     )]
     Harmonic {
         /// Order of θ1 that does not fit.
@@ -277,4 +277,9 @@ pub(crate) fn check_teeth(gear: u8, teeth: u32) -> Result<u32, GeometryError> {
     } else {
         Err(GeometryError::Teeth { gear, teeth, lower: MIN_TEETH, upper: MAX_TEETH })
     }
+}
+
+/// A unit behind its number; nothing for numbers that have none.
+fn spaced(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }

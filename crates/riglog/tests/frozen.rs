@@ -59,12 +59,3 @@ fn what_is_written_today_holds_the_same_records() {
         |path| read(path).0.into_iter().filter(|record| !matches!(record, Record::Te { .. })).collect::<Vec<_>>();
     assert_eq!(but_te(&path), but_te(&fixture("v1.mcap")));
 }
-
-#[test]
-#[ignore = "makes the fixtures of a new version; those of old versions are never made again"]
-fn make() {
-    let path = fixture("v1.mcap");
-    common::write(&path, &V1).unwrap();
-    let bytes = std::fs::read(&path).unwrap();
-    std::fs::write(fixture("v1_cut.mcap"), &bytes[..bytes.len() / 2]).unwrap();
-}
