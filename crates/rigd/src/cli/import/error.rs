@@ -33,6 +33,7 @@ pub enum ImportError {
         path: PathBuf,
     },
     /// This build has no Parquet.
+    #[cfg(not(feature = "parquet"))]
     #[error(
         "{}: this build of rigd cannot read Parquet; build it with `cargo build --release -p rigd --features parquet`, or save the table as CSV",
         path.display()
