@@ -12,8 +12,8 @@
 //! - [`Direction`] names the driver's sense of rotation and with it the active flank. TE of both senses is counted in the
 //!   same positive sense of θ2, so that backlash = TE_cw − TE_ccw at equal θ1.
 //!
-//! Reading order: [`pitch_curve`] → [`GearPair`] → [`increment`] → [`NominalModel`] (the model, first order) → [`contact`] (the model, exact); [`measure`] (the
-//! measurement).
+//! Reading order: [`pitch_curve`] → [`GearPair`] → [`increment`] → [`NominalModel`] (the model, first order) → [`contact`] (the
+//! model, exact) → [`loaded`]; [`measure`] (the measurement). The theory stands in [`theory`], page by page.
 
 pub mod contact;
 mod direction;
@@ -33,6 +33,8 @@ pub mod pitch_curve;
 pub mod sensitivity;
 mod spec;
 pub mod sweep;
+#[cfg(doc)]
+pub mod theory;
 mod tip;
 pub mod tolerance;
 mod tooth_check;
