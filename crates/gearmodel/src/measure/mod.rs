@@ -2,15 +2,21 @@
 
 mod backlash;
 mod figures;
+mod floor;
 mod grid;
 mod order;
 mod run_te;
+mod spectrum;
+mod wave_split;
 
 pub use backlash::BacklashCurve;
 pub use figures::{RunFigures, common_zero};
+pub use floor::{FloorError, RepeatabilityFloor};
 pub use grid::{AngleGrid, Curve};
 pub use order::Order;
 pub use run_te::{RunConditions, RunTe, TePoint};
+pub use spectrum::{OrderAxis, OrderSpectrum, SpectrumError, SpectrumLine};
+pub use wave_split::{WaveFigures, WaveFilter, WaveSplit};
 
 /// Why measured curves cannot be combined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
