@@ -1,6 +1,6 @@
 //! Charts: panels of curves over an angle or any other axis, as SVG, PNG or a page that shows values under the pointer.
 //!
-//! What is drawn is plain data here; [`render`] draws it on any backend of plotters, [`html`] adds the pointer.
+//! What is drawn is plain data here; `render` draws it on any backend of plotters, `html` adds the pointer.
 
 mod font;
 mod html;

@@ -9,7 +9,7 @@
 //! | [`servo`] | Delta ASDA-B2 | Modbus RTU, `docs/wire/asda-b2.md` |
 //! | [`brake`] | Riden RD60xx | Modbus RTU, `docs/wire/rd60xx.md` |
 //! | [`counter`] | the rig's counter box | `docs/wire/counter-box.md` |
-//! | [`line`] | a Modbus line with a device at its end, and the faults a line can have | |
+//! | [`mod@line`] | a Modbus line with a device at its end, and the faults a line can have | |
 
 pub mod brake;
 pub mod counter;
