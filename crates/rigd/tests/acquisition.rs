@@ -18,6 +18,8 @@ use wire::counter_box::{SampleFlags, Samples};
 const COUNTS: u64 = 7_200_000;
 const DT_NS: u32 = 100_000;
 const BATCH: usize = 100;
+/// The model knows errors (2 mrad peak-to-peak and more) that this source has not.
+const MODEL_ERRORS_RAD: f64 = 5e-3;
 
 /// A counter box on a rig that turns evenly and without error.
 struct Source {
@@ -57,8 +59,12 @@ impl Source {
     }
 }
 
-/// Records one revolution; `keep` says which batches reach us.
-fn record(directory: &Path, direction: Direction, keep: impl Fn(usize) -> bool) -> (PathBuf, Analysis, u64) {
+/// Records one revolution; `arrives` may change a batch and says whether it reaches us. Also the largest excursion of TE.
+fn record(
+    directory: &Path,
+    direction: Direction,
+    arrives: impl Fn(usize, &mut Samples) -> bool,
+) -> (PathBuf, Analysis, u64, f64) {
     let (pair_toml, model) = pair::load(None).expect("the built-in pair");
     let path = directory.join("run.mcap");
     let recorder = Recorder::create(&path, WriterOptions::new("test")).expect("a log");
@@ -79,8 +85,8 @@ fn record(directory: &Path, direction: Direction, keep: impl Fn(usize) -> bool) 
     acquisition.status.phase = Phase::Settle;
     acquisition.arm(RunConditions { direction, load_nm: 0.0, speed_rpm: 5.0 }, 1.0);
     for n in 0.. {
-        let batch = source.batch();
-        if keep(n) {
+        let mut batch = source.batch();
+        if arrives(n, &mut batch) {
             acquisition.take(&batch);
         }
         if acquisition.recorded() {
@@ -88,16 +94,18 @@ fn record(directory: &Path, direction: Direction, keep: impl Fn(usize) -> bool) 
         }
     }
     let recorded = acquisition.recorded_samples();
+    let excursion_rad = acquisition.latest.excursion_rad;
     let (recorder, analysis) = acquisition.into_parts();
     recorder.finish().expect("a whole log");
-    (path, analysis, recorded)
+    (path, analysis, recorded, excursion_rad)
 }
 
 #[tokio::test]
 async fn a_run_is_exactly_one_revolution_and_replays_to_the_same_bits() {
     for direction in [Direction::Ccw, Direction::Cw] {
         let directory = TempDir::new().expect("a temporary directory");
-        let (path, analysis, recorded) = record(directory.path(), direction, |_| true);
+        let (path, analysis, recorded, excursion_rad) = record(directory.path(), direction, |_, _| true);
+        assert!(excursion_rad < MODEL_ERRORS_RAD, "{excursion_rad}");
         // 2003.7 samples a revolution: 2003 or 2004 of them lie within one.
         assert!((2003..=2004).contains(&recorded), "{direction}: {recorded}");
         let info = riglog::info(&path).expect("a log");
@@ -116,7 +124,7 @@ async fn a_run_is_exactly_one_revolution_and_replays_to_the_same_bits() {
 #[tokio::test]
 async fn a_lost_batch_is_counted_told_and_never_filled_in() {
     let directory = TempDir::new().expect("a temporary directory");
-    let (path, analysis, recorded) = record(directory.path(), Direction::Ccw, |n| n != 7 && n != 8);
+    let (path, analysis, recorded, _) = record(directory.path(), Direction::Ccw, |n, _| n != 7 && n != 8);
     assert_eq!(analysis.runs()[0].losses, 2 * BATCH as u64);
     let info = riglog::info(&path).expect("a log");
     assert_eq!((info.samples, info.losses), (recorded, 2 * BATCH as u64));
@@ -132,4 +140,16 @@ async fn a_lost_batch_is_counted_told_and_never_filled_in() {
     let replayed = replay::replay(&[path], &mut again, None).expect("it replays");
     assert_eq!((replayed.losses, again.te_hash()), (200, analysis.te_hash()));
     assert!(!replayed.incomplete.is_empty());
+}
+
+#[tokio::test]
+async fn a_jump_of_te_is_kept_for_the_supervisor_whose_polls_are_rarer_than_batches() {
+    let directory = TempDir::new().expect("a temporary directory");
+    let jump = COUNTS as i64 / 100;
+    let (.., excursion_rad) = record(directory.path(), Direction::Ccw, |n, batch| {
+        batch.output_base += if n == 9 { jump } else { 0 };
+        true
+    });
+    let expected = std::f64::consts::TAU / 100.0;
+    assert!((excursion_rad - expected).abs() < MODEL_ERRORS_RAD, "{excursion_rad} against {expected}");
 }

@@ -72,7 +72,7 @@ pub struct Latest {
     pub backlash_rad: Option<f64>,
     /// Revolutions of the active run.
     pub revolutions: f64,
-    /// Largest |TE − model − zero| of the last batch, rad.
+    /// Largest |TE − model − zero| of the active run, rad: polls are rarer than batches, and none may be missed.
     pub excursion_rad: f64,
 }
 
@@ -253,6 +253,7 @@ impl Acquisition {
     /// Records `revolutions` whole turns from the next bin edge on.
     pub fn arm(&mut self, conditions: RunConditions, revolutions: f64) {
         self.latest.te_range_rad = [f64::INFINITY, f64::NEG_INFINITY];
+        self.latest.excursion_rad = 0.0;
         self.te_zero_rad = None;
         self.recording = Recording::Armed { conditions, revolutions };
     }
@@ -324,7 +325,6 @@ impl Acquisition {
         accumulate(batch.output_base, &batch.output_delta, &mut self.outputs);
         self.measure_speed(batch.dt_ns);
         self.latest.arrived_ns = arrived;
-        self.latest.excursion_rad = 0.0;
 
         let mut written = 0;
         if self.homed && !matches!(self.recording, Recording::Idle | Recording::Done) {
