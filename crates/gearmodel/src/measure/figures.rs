@@ -151,7 +151,7 @@ fn slope(revolutions: &[(usize, Curve)]) -> f64 {
 }
 
 /// Largest peak-to-peak within any window of one pitch of arc length, rad. Bins that no sample saw are stepped over.
-fn tooth_to_tooth(grid: AngleGrid, curve: &Curve, pair: &GearPair) -> f64 {
+pub(super) fn tooth_to_tooth(grid: AngleGrid, curve: &Curve, pair: &GearPair) -> f64 {
     let Some(pitch_mm) = pair.pitch_mm() else {
         return f64::NAN;
     };

@@ -11,6 +11,7 @@ use std::f64::consts::LN_2;
 
 use serde::{Deserialize, Serialize};
 
+use super::figures::tooth_to_tooth;
 use super::grid::{AngleGrid, Curve};
 use super::spectrum::{AxisPoints, OrderAxis, SpectrumError, check_whole};
 use crate::GearPair;
@@ -110,38 +111,10 @@ impl WaveFigures {
         let centred = Curve { values_rad: curve.values_rad.iter().map(|value| value - mean_rad).collect() };
         Self {
             f_is_total_rad: curve.pp_rad(),
-            f_is_tooth_rad: largest_within_pitch(grid, &curve.values_rad, pair),
+            f_is_tooth_rad: tooth_to_tooth(grid, curve, pair),
             fluctuation_rms_rad: centred.rms_rad(),
         }
     }
-}
-
-/// Largest peak-to-peak within a window of one pitch that starts at any bin; its end is interpolated between bins.
-fn largest_within_pitch(grid: AngleGrid, values: &[f64], pair: &GearPair) -> f64 {
-    let Some(pitch_mm) = pair.pitch_mm() else {
-        return f64::NAN;
-    };
-    let bins = grid.bins();
-    let arcs_mm: Vec<f64> = grid.centres().map(|theta1_rad| pair.arc_length_mm(theta1_rad)).collect();
-    let perimeter_mm = pair.perimeter_mm();
-    let from_start = |start: usize| {
-        let (mut low, mut high) = (values[start], values[start]);
-        let (mut arc_before, mut value_before) = (0.0, values[start]);
-        for bin in start + 1..=start + bins {
-            let (turn_mm, slot) = if bin < bins { (0.0, bin) } else { (perimeter_mm, bin - bins) };
-            let arc_mm = arcs_mm[slot] + turn_mm - arcs_mm[start];
-            let ends = arc_mm >= pitch_mm;
-            let share = if ends { (pitch_mm - arc_before) / (arc_mm - arc_before) } else { 1.0 };
-            let value = value_before + (values[slot] - value_before) * share;
-            (low, high) = (f64::min(low, value), f64::max(high, value));
-            if ends {
-                break;
-            }
-            (arc_before, value_before) = (arc_mm, value);
-        }
-        high - low
-    };
-    (0..bins).map(from_start).fold(f64::NAN, f64::max)
 }
 
 #[cfg(test)]

@@ -167,9 +167,4 @@ impl Counter for CounterBox {
     async fn stop(&mut self) -> Result<(), DeviceError> {
         self.command("stop", |request_id| Command::Stop { request_id }).await
     }
-
-    fn damaged_frames(&self) -> u64 {
-        let stats = self.decoder.stats();
-        stats.crc_errors + stats.malformed
-    }
 }

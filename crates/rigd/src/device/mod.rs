@@ -190,8 +190,6 @@ pub trait Counter {
     async fn next(&mut self) -> Result<Samples, DeviceError>;
     /// Ends the stream.
     async fn stop(&mut self) -> Result<(), DeviceError>;
-    /// Frames that were damaged on the way.
-    fn damaged_frames(&self) -> u64;
 }
 
 /// Drivers by their name in the profile: each is opened on its link.
