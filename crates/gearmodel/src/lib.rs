@@ -17,9 +17,11 @@
 
 pub mod contact;
 mod direction;
+pub mod effect;
 mod errors;
 mod flank;
 mod free;
+pub mod gap;
 mod geometry_error;
 pub mod increment;
 pub mod loaded;

@@ -1,0 +1,33 @@
+//! Tooth thinning differs from the designed backlash by dj along the pitch curve:
+//! TE = −dir·(dj/2) cos α/A.
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+
+/// Tooth thinning differs from the designed backlash by dj along the pitch curve.
+pub(super) struct BacklashError;
+
+impl Effect for BacklashError {
+    fn name(&self) -> &'static str {
+        "backlash_error"
+    }
+
+    fn component(&self) -> &'static str {
+        "gear teeth"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Input, Parity::Odd)
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    fn row(&self, rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        row[0] = -at.sense * 0.5 * rig.pair().pressure_angle_rad().cos() / at.arm_mm;
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![Parameter::number("dj_mm", found.beta[0], found.std(0), "mm")]
+    }
+}

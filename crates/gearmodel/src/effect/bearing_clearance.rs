@@ -1,0 +1,37 @@
+//! Bearings with play: the load pushes the gear aside by c along the common normal, TE = −dir·c/A, whatever its size.
+//! The same trace as a backlash error of 2c/cos α.
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+
+/// Bearings with play.
+pub(super) struct BearingClearance;
+
+impl Effect for BearingClearance {
+    fn name(&self) -> &'static str {
+        "bearing_clearance"
+    }
+
+    fn component(&self) -> &'static str {
+        "bearings"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Input, Parity::Odd)
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    fn one_sided(&self) -> bool {
+        true
+    }
+
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        row[0] = -at.sense / at.arm_mm;
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![Parameter::number("c_mm", found.beta[0], found.std(0), "mm")]
+    }
+}

@@ -1,0 +1,29 @@
+//! Centre distance grown by Δa against the documented one: gear 1 moves by (−Δa, 0) against gear 2,
+//! TE = −dir·Δa tan(α ∓ μ)/r2.
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+
+/// Centre distance grown by Δa against the documented one.
+pub(super) struct CentreDistanceError;
+
+impl Effect for CentreDistanceError {
+    fn name(&self) -> &'static str {
+        "centre_distance_error"
+    }
+
+    fn component(&self) -> &'static str {
+        "housing"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Input, Parity::Mixed)
+    }
+
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        row[0] = -at.sense * at.pressure_rad.tan() / at.r2_mm;
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![Parameter::number("da_mm", found.beta[0], found.std(0), "mm")]
+    }
+}

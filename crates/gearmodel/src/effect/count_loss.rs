@@ -1,0 +1,57 @@
+//! A counter loses (or wins) counts at the output: steps of n counts, always the same way, that stay. TE = Σ steps so far ·
+//! 2π n/(counts a revolution). The shape lists the times of the steps, s (`gap::steps` finds them); the amplitude is one
+//! step.
+
+use std::f64::consts::TAU;
+
+use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+
+/// Lost counts of the output encoder.
+pub(super) struct CountLoss;
+
+impl Effect for CountLoss {
+    fn name(&self) -> &'static str {
+        "count_loss"
+    }
+
+    fn component(&self) -> &'static str {
+        "acquisition"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::None, Parity::Even).accumulating(Accumulates::PerRevolution)
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    /// None before the residual was searched for steps.
+    fn shapes(&self, _rig: &Rig, _plan: &Plan) -> Vec<Shape> {
+        Vec::new()
+    }
+
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+        row[0] = shape.partition_point(|time_s| *time_s <= at.time_s) as f64;
+    }
+
+    fn evolves(&self) -> bool {
+        true
+    }
+
+    fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        let step_rad = found.beta[0];
+        let steps = shape.len() as f64;
+        let mut parameters = Vec::new();
+        if let Some(counts_per_rev) = rig.output_counts_per_rev {
+            let counts = step_rad * counts_per_rev / TAU;
+            let std = found.std(0) * counts_per_rev / TAU;
+            // A count is whole: a step known to a third of one is exactly that many.
+            let whole = if std < 0.34 { counts.round() } else { counts };
+            parameters.push(Parameter::number("counts", whole, std, "counts"));
+        }
+        parameters.push(Parameter::number("step_rad", step_rad, found.std(0), "rad"));
+        parameters.push(Parameter::number("steps", steps, 0.0, ""));
+        parameters
+    }
+}

@@ -1,0 +1,57 @@
+//! A coupling bent by the angle β turns unevenly, twice a turn: tan θ' = tan θ/cos β, to first order θ' = θ + (β²/4) sin(2θ − φ).
+//! In the output shaft the encoder reads θ2 + (β²/4) sin(2θ2 − φ); in the input shaft gear 1 stands at θ1 + (β²/4) sin(2θ1 − φ),
+//! seen as i times that.
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+
+/// Misalignment of the coupling in the input or output shaft.
+pub(super) struct CouplingMisalignment(pub(super) Shaft);
+
+impl Effect for CouplingMisalignment {
+    fn name(&self) -> &'static str {
+        match self.0 {
+            Shaft::Input => "coupling_misalignment_input",
+            Shaft::Output => "coupling_misalignment_output",
+        }
+    }
+
+    fn component(&self) -> &'static str {
+        match self.0 {
+            Shaft::Input => "input coupling",
+            Shaft::Output => "output coupling",
+        }
+    }
+
+    fn signature(&self) -> Signature {
+        let carrier = if self.0 == Shaft::Input { Carrier::Input } else { Carrier::Output };
+        Signature::steady(carrier, Parity::Even)
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
+        2
+    }
+
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        let (angle_rad, gain) = match self.0 {
+            Shaft::Input => (at.theta1_rad, at.ratio),
+            Shaft::Output => (at.theta2_rad, 1.0),
+        };
+        let (sin, cos) = (2.0 * angle_rad).sin_cos();
+        row[0] = gain * sin;
+        row[1] = gain * cos;
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        let polar = found.polar(0);
+        // Amplitude β²/4: β = 2 √a, dβ = da/√a.
+        let root = polar.amplitude.sqrt().max(f64::MIN_POSITIVE);
+        vec![
+            Parameter::number("beta_rad", 2.0 * root, polar.amplitude_std / root, "rad"),
+            Parameter::number("phase_rad", polar.phase_rad, polar.phase_std_rad, "rad"),
+        ]
+    }
+}

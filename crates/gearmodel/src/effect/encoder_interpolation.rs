@@ -1,0 +1,57 @@
+//! Sub-divisional error: the signals within one line period are not true sine and cosine (offset: order 1 of the line,
+//! unequal amplitudes or quadrature: order 2), reading θ + a sin(h·L·θ − φ). Averaging over angle bins hides it; it is found
+//! on the samples (`gap::line_phase`). The shape is [order h, lines L].
+
+use super::encoder_eccentricity::reading_error;
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+
+/// Interpolation error of the input or output encoder.
+pub(super) struct EncoderInterpolation(pub(super) Shaft);
+
+impl Effect for EncoderInterpolation {
+    fn name(&self) -> &'static str {
+        match self.0 {
+            Shaft::Input => "encoder1_interpolation",
+            Shaft::Output => "encoder2_interpolation",
+        }
+    }
+
+    fn component(&self) -> &'static str {
+        match self.0 {
+            Shaft::Input => "input encoder",
+            Shaft::Output => "output encoder",
+        }
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::EncoderLine, Parity::Even)
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    /// None before the samples were searched for lines.
+    fn shapes(&self, _rig: &Rig, _plan: &super::Plan) -> Vec<Shape> {
+        Vec::new()
+    }
+
+    fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
+        2
+    }
+
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+        if let [order, lines] = shape[..] {
+            reading_error(self.0, order * lines, at, row);
+        }
+    }
+
+    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        let mut parameters = found.polar(0).parameters("a_rad", "rad");
+        if let [order, lines] = shape[..] {
+            parameters.insert(1, Parameter::grid("lines", lines, ""));
+            parameters.push(Parameter::grid("order", order, ""));
+        }
+        parameters
+    }
+}

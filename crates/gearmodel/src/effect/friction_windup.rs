@@ -1,0 +1,37 @@
+//! Drag of seals and bearings winds the shafts up beside the load: TE = −dir·M·[C_out + C_in i² + C_mesh/A²] with the
+//! documented compliances, or at 1 rad/(N·m) where there are none.
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+
+/// Drag of seals and bearings winds the shafts up beside the load.
+pub(super) struct FrictionWindup;
+
+impl Effect for FrictionWindup {
+    fn name(&self) -> &'static str {
+        "friction_windup"
+    }
+
+    fn component(&self) -> &'static str {
+        "shafts and seals"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Input, Parity::Odd)
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    fn one_sided(&self) -> bool {
+        true
+    }
+
+    fn row(&self, rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        row[0] = -at.sense * rig.train_compliance_rad_per_nm(at);
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![Parameter::number("torque_nm", found.beta[0], found.std(0), "N.m")]
+    }
+}

@@ -1,0 +1,32 @@
+//! The teeth give way along the common normal: TE = −dir·T·C/A².
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+
+/// The teeth give way along the common normal.
+pub(super) struct MeshCompliance;
+
+impl Effect for MeshCompliance {
+    fn name(&self) -> &'static str {
+        "mesh_compliance"
+    }
+
+    fn component(&self) -> &'static str {
+        "gear teeth"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Input, Parity::Odd).with_load(1.0)
+    }
+
+    fn one_sided(&self) -> bool {
+        true
+    }
+
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        row[0] = -at.sense * at.load_nm / (at.arm_mm * at.arm_mm);
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![Parameter::number("c_mm2_rad_per_nm", found.beta[0], found.std(0), "mm2.rad/(N.m)")]
+    }
+}

@@ -1,0 +1,61 @@
+//! With two tooth pairs in contact the mesh is stiffer than with one: TE = −dir·T·C·w(u)/A² with w = 1 − duty where one pair
+//! carries and −duty elsewhere, zero in the mean over a pitch. `duty` is the share of a pitch on one pair. Shape [duty, start]:
+//! the stretch on one pair begins at u = start.
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+
+/// Variation of the mesh compliance over the pitch.
+pub(super) struct MeshStiffnessVariation;
+
+const DUTIES: [f64; 5] = [0.15, 0.3, 0.45, 0.6, 0.8];
+
+impl Effect for MeshStiffnessVariation {
+    fn name(&self) -> &'static str {
+        "mesh_stiffness_variation"
+    }
+
+    fn component(&self) -> &'static str {
+        "gear teeth"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Mesh, Parity::Odd).with_load(1.0)
+    }
+
+    fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
+        if plan.loads_nm.last().is_none_or(|load| *load <= 0.0) {
+            return Vec::new();
+        }
+        let mut shapes = Vec::new();
+        for duty in DUTIES {
+            // About the pitch point, from it on, and in steps of an eighth of a pitch.
+            shapes.push(vec![duty, 0.0]);
+            shapes.extend((0..8).map(|n| vec![duty, 0.125 * f64::from(n) - 0.5 * duty]));
+        }
+        shapes
+    }
+
+    fn neighbours(&self, shape: &Shape) -> Vec<Shape> {
+        let [duty, start] = shape[..] else { return Vec::new() };
+        let mut shapes = Vec::new();
+        for wider in [-0.08, -0.04, -0.02, 0.0, 0.02, 0.04, 0.08] {
+            for later in [-0.06, -0.03, -0.01, 0.0, 0.01, 0.03, 0.06] {
+                shapes.push(vec![(duty + wider).clamp(0.02, 0.98), start + later]);
+            }
+        }
+        shapes
+    }
+
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+        let [duty, start] = shape[..] else { return };
+        let weight = if (at.pitches - start).rem_euclid(1.0) < duty { 1.0 - duty } else { -duty };
+        row[0] = -at.sense * at.load_nm * weight / (at.arm_mm * at.arm_mm);
+    }
+
+    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![
+            Parameter::number("c_mm2_rad_per_nm", found.beta[0], found.std(0), "mm2.rad/(N.m)"),
+            Parameter::grid("duty", shape[0], ""),
+        ]
+    }
+}

@@ -1,0 +1,32 @@
+//! Gear 1 is clocked by δ against its encoder's index: it stands at θ1 + δ, TE = f(θ1 + δ) − f(θ1) = i δ.
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+
+/// Gear 1 is clocked by δ against its encoder's index.
+pub(super) struct PhasingError;
+
+impl Effect for PhasingError {
+    fn name(&self) -> &'static str {
+        "phasing_error"
+    }
+
+    fn component(&self) -> &'static str {
+        "gear 1 on its shaft, or the index"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Input, Parity::Even)
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        row[0] = at.ratio;
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![Parameter::number("delta_rad", found.beta[0], found.std(0), "rad")]
+    }
+}

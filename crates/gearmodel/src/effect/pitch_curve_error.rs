@@ -1,0 +1,63 @@
+//! The pitch curves are not those documented. Shape [0]: an elliptic pair's true k differs by dk and still closes,
+//! TE = dk ∂f/∂k. With tan(f/2) = c tan(θ1/2), c = (1+k)/(1−k): ∂f/∂k = 2 sin f/(1 − k²). Shape [1]: the pair closes
+//! otherwise (a wrong ratio), TE = dk·θ1, which grows with every revolution and returns when the sense turns.
+
+use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+
+/// Error of the pitch curves' form or closure.
+pub(super) struct PitchCurveError;
+
+impl Effect for PitchCurveError {
+    fn name(&self) -> &'static str {
+        "pitch_curve_error"
+    }
+
+    fn component(&self) -> &'static str {
+        "gears"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Output, Parity::Even)
+    }
+
+    fn signature_of(&self, _rig: &Rig, shape: &Shape) -> Signature {
+        if shape[..] == [1.0] {
+            Signature::steady(Carrier::None, Parity::Even).accumulating(Accumulates::PerRevolution)
+        } else {
+            self.signature()
+        }
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    fn shapes(&self, rig: &Rig, plan: &Plan) -> Vec<Shape> {
+        let mut shapes = Vec::new();
+        if rig.eccentricity().is_some() {
+            shapes.push(vec![0.0]);
+        }
+        if plan.revolutions > 1.0 {
+            shapes.push(vec![1.0]);
+        }
+        shapes
+    }
+
+    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+        row[0] = if shape[..] == [1.0] {
+            at.theta1_rad
+        } else {
+            let k = rig.eccentricity().unwrap_or(0.0);
+            2.0 * at.theta2_rad.sin() / (1.0 - k * k)
+        };
+    }
+
+    fn evolves(&self) -> bool {
+        true
+    }
+
+    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        let unit = if shape[..] == [1.0] { "rad/rad" } else { "" };
+        vec![Parameter::number("dk", found.beta[0], found.std(0), unit)]
+    }
+}

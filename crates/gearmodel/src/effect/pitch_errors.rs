@@ -1,0 +1,95 @@
+//! Each driver tooth's flank stands off its place by d_j along the normal (+ = driven gear moved ahead). Of the pairs in
+//! contact the most advanced in the sense of motion carries: TE = max_j d_j/A driving ccw, min_j d_j/A driving cw. A
+//! displaced tooth shows alike in both senses, a thicker one with opposite signs; the mean over a flank is a backlash. Where
+//! Z1 = Z2 a driver tooth always meets the same driven one, and d_j is the sum of both.
+//!
+//! The trace is linear in d once it is known which pair carries. The shape holds the table that decides it (empty: all pairs
+//! in contact share alike); `refine` moves it to the table found.
+
+use std::f64::consts::TAU;
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station, Value};
+
+/// Pitch errors of the driver's teeth, flank by flank.
+pub(super) struct PitchErrors;
+
+fn teeth(rig: &Rig) -> usize {
+    rig.pair().teeth().0 as usize
+}
+
+/// Zero-mean waves over the teeth, orthonormal: value of wave `n` (of Z − 1) at tooth `j`.
+fn wave(n: usize, j: usize, teeth: usize) -> f64 {
+    let order = n / 2 + 1;
+    let angle_rad = TAU * (order * j % teeth) as f64 / teeth as f64;
+    if 2 * order == teeth {
+        return angle_rad.cos() / (teeth as f64).sqrt();
+    }
+    let scale = (2.0 / teeth as f64).sqrt();
+    if n.is_multiple_of(2) { scale * angle_rad.cos() } else { scale * angle_rad.sin() }
+}
+
+/// Displacements by tooth, ccw flanks then cw flanks, from the waves' amplitudes.
+fn table(beta: &[f64], teeth: usize) -> Vec<f64> {
+    let waves = teeth - 1;
+    (0..2 * teeth)
+        .map(|place| {
+            let (side, j) = (place / teeth, place % teeth);
+            (0..waves).map(|n| beta[side * waves + n] * wave(n, j, teeth)).sum()
+        })
+        .collect()
+}
+
+impl Effect for PitchErrors {
+    fn name(&self) -> &'static str {
+        "pitch_errors"
+    }
+
+    fn component(&self) -> &'static str {
+        "gear teeth"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Input, Parity::Mixed)
+    }
+
+    fn applies(&self, rig: &Rig) -> bool {
+        teeth(rig) > 2
+    }
+
+    fn width(&self, rig: &Rig, _shape: &Shape) -> usize {
+        2 * (teeth(rig) - 1)
+    }
+
+    fn refine(&self, rig: &Rig, _shape: &Shape, beta: &[f64]) -> Option<Shape> {
+        Some(table(beta, teeth(rig)))
+    }
+
+    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+        let teeth = teeth(rig);
+        let side = usize::from(at.sense < 0.0);
+        let waves = teeth - 1;
+        let mut add = |tooth: usize, share: f64| {
+            for (n, cell) in row[side * waves..(side + 1) * waves].iter_mut().enumerate() {
+                *cell += share * wave(n, tooth, teeth) / at.arm_mm;
+            }
+        };
+        if shape.is_empty() {
+            let pairs = rig.teeth_in_contact(at).count().max(1) as f64;
+            rig.teeth_in_contact(at).for_each(|tooth| add(tooth, 1.0 / pairs));
+        } else {
+            let lead = |tooth: &usize| at.sense * shape[side * teeth + tooth];
+            if let Some(tooth) = rig.teeth_in_contact(at).max_by(|a, b| lead(a).total_cmp(&lead(b))) {
+                add(tooth, 1.0);
+            }
+        }
+    }
+
+    fn parameters(&self, rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        let teeth = teeth(rig);
+        let mut ccw = table(&found.beta, teeth);
+        let cw = ccw.split_off(teeth);
+        [("ccw_mm", ccw), ("cw_mm", cw)]
+            .map(|(name, values)| Parameter { name, value: Value::Table(values), std: None, unit: "mm" })
+            .into()
+    }
+}

@@ -1,0 +1,57 @@
+//! The same deviation of form on every tooth: lead Σ a_h cos(2π h u − φ_h) along the normal for h = 1, 2, 3, TE = lead/A. Shape
+//! [0]: one deviation for both flanks, counted from each flank's own tooth 0; shape [1]: a deviation a flank.
+
+use std::f64::consts::TAU;
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+
+/// Profile deviation by mesh orders.
+pub(super) struct ProfileError;
+
+const ORDERS: usize = 3;
+const NAMES: [[&str; 2]; ORDERS] = [["a1_mm", "ph1_rad"], ["a2_mm", "ph2_rad"], ["a3_mm", "ph3_rad"]];
+
+impl Effect for ProfileError {
+    fn name(&self) -> &'static str {
+        "profile_error"
+    }
+
+    fn component(&self) -> &'static str {
+        "gear teeth"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Mesh, Parity::Mixed)
+    }
+
+    fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
+        if plan.senses == [true, true] { vec![vec![0.0], vec![1.0]] } else { vec![vec![0.0]] }
+    }
+
+    fn width(&self, _rig: &Rig, shape: &Shape) -> usize {
+        if shape[..] == [1.0] { 4 * ORDERS } else { 2 * ORDERS }
+    }
+
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+        let first = if shape[..] == [1.0] && at.sense < 0.0 { 2 * ORDERS } else { 0 };
+        for h in 0..ORDERS {
+            let (sin, cos) = (TAU * (h + 1) as f64 * at.pitches).sin_cos();
+            // a cos(x − φ) = a sin(x − (φ − π/2)): columns sin, cos.
+            row[first + 2 * h] = sin / at.arm_mm;
+            row[first + 2 * h + 1] = cos / at.arm_mm;
+        }
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        (0..ORDERS)
+            .flat_map(|h| {
+                let polar = found.polar(2 * h);
+                let phase_rad = (polar.phase_rad + 0.25 * TAU + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
+                [
+                    Parameter::number(NAMES[h][0], polar.amplitude, polar.amplitude_std, "mm"),
+                    Parameter::number(NAMES[h][1], phase_rad, polar.phase_std_rad, "rad"),
+                ]
+            })
+            .collect()
+    }
+}

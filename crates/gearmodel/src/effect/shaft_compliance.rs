@@ -1,0 +1,45 @@
+//! A shaft is softer than documented: the load winds it up, TE = −dir·T·C for the output shaft, −dir·T·C i² for the input
+//! shaft, whose torque is T i and whose twist is seen through the ratio.
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+
+/// Compliance of the input or output shaft beyond the documented one.
+pub(super) struct ShaftCompliance(pub(super) Shaft);
+
+impl Effect for ShaftCompliance {
+    fn name(&self) -> &'static str {
+        match self.0 {
+            Shaft::Input => "shaft_compliance_input",
+            Shaft::Output => "shaft_compliance_output",
+        }
+    }
+
+    fn component(&self) -> &'static str {
+        match self.0 {
+            Shaft::Input => "input shaft",
+            Shaft::Output => "output shaft",
+        }
+    }
+
+    fn signature(&self) -> Signature {
+        let carrier = if self.0 == Shaft::Input { Carrier::Input } else { Carrier::None };
+        Signature::steady(carrier, Parity::Odd).with_load(1.0)
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    fn one_sided(&self) -> bool {
+        true
+    }
+
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        let seen = if self.0 == Shaft::Input { at.ratio * at.ratio } else { 1.0 };
+        row[0] = -at.sense * at.load_nm * seen;
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![Parameter::number("c_rad_per_nm", found.beta[0], found.std(0), "rad/(N.m)")]
+    }
+}

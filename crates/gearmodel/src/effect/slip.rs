@@ -1,0 +1,62 @@
+//! A clamp creeps above a torque: a lag of k·max(0, T − t0) a driver revolution, in the sense of motion, that stays.
+//! TE = −k Σ dir·max(0, T − t0)·revolutions. The shape is [t0].
+
+use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+
+/// Slip of a clamp or coupling.
+pub(super) struct Slip;
+
+impl Effect for Slip {
+    fn name(&self) -> &'static str {
+        "slip"
+    }
+
+    fn component(&self) -> &'static str {
+        "clamp or coupling"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::None, Parity::Odd).with_load(1.0).accumulating(Accumulates::PerRevolution)
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    /// Thresholds from none to just under the largest load. Between two loads the trace is not linear in t0 only above
+    /// the lower one.
+    fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
+        let largest = plan.loads_nm.last().copied().unwrap_or(0.0);
+        if largest <= 0.0 {
+            return Vec::new();
+        }
+        (0..10).map(|n| vec![0.1 * f64::from(n) * largest]).collect()
+    }
+
+    fn neighbours(&self, shape: &Shape) -> Vec<Shape> {
+        let step = 0.02 * shape[0].max(5.0);
+        [-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0].into_iter().map(|n| vec![(shape[0] + n * step).max(0.0)]).collect()
+    }
+
+    fn evolves(&self) -> bool {
+        true
+    }
+
+    fn one_sided(&self) -> bool {
+        true
+    }
+
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+        let [threshold_nm] = shape[..] else { return };
+        let ledger = &at.ledger;
+        row[0] =
+            -ledger.load_nm.iter().zip(&ledger.signed_rev).map(|(load, rev)| (load - threshold_nm).max(0.0) * rev).sum::<f64>();
+    }
+
+    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![
+            Parameter::number("k_rad_per_rev_nm", found.beta[0], found.std(0), "rad/(rev.N.m)"),
+            Parameter::grid("t0_nm", shape[0], "N.m"),
+        ]
+    }
+}

@@ -1,0 +1,77 @@
+//! Where and when a residual was seen: everything that an effect's trace may depend on.
+
+use crate::Direction;
+
+/// One place in a campaign.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Station {
+    /// Driver angle θ1, rad.
+    pub theta1_rad: f64,
+    /// Driven angle, rad.
+    pub theta2_rad: f64,
+    /// Driving sense: +1 ccw, −1 cw.
+    pub sense: f64,
+    /// i21(θ1).
+    pub ratio: f64,
+    /// Driven radius r2, mm.
+    pub r2_mm: f64,
+    /// Effective pressure angle of the driving flank α ∓ μ, rad.
+    pub pressure_rad: f64,
+    /// Driven base arm A = r2 cos(α ∓ μ), mm.
+    pub arm_mm: f64,
+    /// Arc rolled since tooth 0 of the driving flank passed the pitch point, in pitches.
+    pub pitches: f64,
+    /// Load on the driven shaft, N·m.
+    pub load_nm: f64,
+    /// Driver speed, signed, rad/s.
+    pub speed_rad_per_s: f64,
+    /// Time since the campaign's earliest sample, s.
+    pub time_s: f64,
+    /// Way of the driver since then in either sense, revolutions.
+    pub way_rev: f64,
+    /// Way signed by the sense, revolutions, by load over a threshold is the effects' own affair: see `loads`.
+    pub net_rev: f64,
+    /// Run's number.
+    pub run: usize,
+    /// Signed revolutions driven so far at each of the plan's loads.
+    pub ledger: Ledger,
+}
+
+/// Most distinct loads whose revolutions are booked apart.
+pub const LEDGER_LOADS: usize = 8;
+
+/// Signed driver revolutions so far, by load: what carried-over slip is computed from.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ledger {
+    /// Loads, N·m.
+    pub load_nm: [f64; LEDGER_LOADS],
+    /// Revolutions, ccw positive.
+    pub signed_rev: [f64; LEDGER_LOADS],
+    /// Revolutions in either sense.
+    pub way_rev: [f64; LEDGER_LOADS],
+}
+
+impl Station {
+    /// The driving sense.
+    #[must_use]
+    pub fn direction(&self) -> Direction {
+        if self.sense > 0.0 { Direction::Ccw } else { Direction::Cw }
+    }
+}
+
+/// What the recordings cover.
+#[derive(Clone, Debug, Default)]
+pub struct Plan {
+    /// Distinct loads, N·m, ascending.
+    pub loads_nm: Vec<f64>,
+    /// Distinct driver speeds, rad/s, ascending.
+    pub speeds_rad_per_s: Vec<f64>,
+    /// Senses seen: ccw, cw.
+    pub senses: [bool; 2],
+    /// From the earliest to the latest sample, s.
+    pub duration_s: f64,
+    /// Runs.
+    pub runs: usize,
+    /// Revolutions of the driver in all.
+    pub revolutions: f64,
+}

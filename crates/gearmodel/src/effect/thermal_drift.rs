@@ -1,0 +1,46 @@
+//! The housing warms and the centre distance grows, Δa(t) = da (1 − exp(−t/τ)) since the campaign's first sample:
+//! TE = −dir·Δa(t) tan(α ∓ μ)/r2. The shape is [τ].
+
+use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+
+/// Thermal growth of the centre distance.
+pub(super) struct ThermalDrift;
+
+impl Effect for ThermalDrift {
+    fn name(&self) -> &'static str {
+        "thermal_drift"
+    }
+
+    fn component(&self) -> &'static str {
+        "housing and gears"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Time, Parity::Mixed).accumulating(Accumulates::PerTime)
+    }
+
+    /// From a twelfth of the campaign (faster than that it is a constant) to thrice its length (a straight line).
+    fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
+        [0.08, 0.16, 0.3, 0.6, 1.2, 3.0].into_iter().map(|part| vec![part * plan.duration_s.max(1e-3)]).collect()
+    }
+
+    fn neighbours(&self, shape: &Shape) -> Vec<Shape> {
+        [0.6, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 1.65].into_iter().map(|factor| vec![factor * shape[0]]).collect()
+    }
+
+    fn evolves(&self) -> bool {
+        true
+    }
+
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+        let [tau_s] = shape[..] else { return };
+        row[0] = at.sense * at.pressure_rad.tan() / at.r2_mm * (-at.time_s / tau_s).exp_m1();
+    }
+
+    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![
+            Parameter::number("da_mm", found.beta[0], found.std(0), "mm"),
+            Parameter::grid("tau_s", shape[0], "s"),
+        ]
+    }
+}

@@ -1,0 +1,32 @@
+//! θ2 was read dt later than θ1, and by then has moved on: TE = dt·dθ2/dt = dt·i·dθ1/dt.
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+
+/// θ2 was read dt later than θ1, and by then has moved on.
+pub(super) struct TimeSkew;
+
+impl Effect for TimeSkew {
+    fn name(&self) -> &'static str {
+        "time_skew"
+    }
+
+    fn component(&self) -> &'static str {
+        "acquisition"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Input, Parity::Odd).with_speed(Some(1.0))
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        row[0] = at.ratio * at.speed_rad_per_s;
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![Parameter::number("dt_s", found.beta[0], found.std(0), "s")]
+    }
+}

@@ -1,0 +1,81 @@
+//! Material is missing on one flank of one driver tooth: the driven gear lags by depth·cos²(π v/(2 w))/A while that tooth carries,
+//! |v| < w, v = u − tooth. The shape is [tooth, flank (+1 ccw, −1 cw), width w].
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station, Value};
+
+/// One damaged tooth flank.
+pub(super) struct ToothDamage;
+
+/// Widths searched first, pitches.
+const WIDTHS: [f64; 2] = [0.35, 0.8];
+
+impl Effect for ToothDamage {
+    fn name(&self) -> &'static str {
+        "tooth_damage"
+    }
+
+    fn component(&self) -> &'static str {
+        "one tooth of gear 1, or its mate"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::Input, Parity::OneFlank)
+    }
+
+    fn signature_of(&self, rig: &Rig, shape: &Shape) -> Signature {
+        let [tooth, flank, width] = shape[..] else { return self.signature() };
+        let half = if flank > 0.0 { 0.0 } else { 0.5 };
+        let at = |pitches: f64| {
+            rig.pair().theta1_at_arc_length((pitches + half) * PI * rig.pair().module_mm()).to_degrees()
+        };
+        Signature { sector_deg: Some([at(tooth - width), at(tooth + width)]), ..self.signature() }
+    }
+
+    fn shapes(&self, rig: &Rig, plan: &Plan) -> Vec<Shape> {
+        let mut shapes = Vec::new();
+        for (flank, seen) in [1.0, -1.0].into_iter().zip(plan.senses) {
+            for tooth in (0..rig.pair().teeth().0).filter(|_| seen) {
+                shapes.extend(WIDTHS.map(|width| vec![f64::from(tooth), flank, width]));
+            }
+        }
+        shapes
+    }
+
+    fn neighbours(&self, shape: &Shape) -> Vec<Shape> {
+        [0.6, 0.8, 0.9, 1.1, 1.25, 1.6]
+            .into_iter()
+            .map(|factor| vec![shape[0], shape[1], (shape[2] * factor).clamp(0.05, 1.5)])
+            .collect()
+    }
+
+    fn one_sided(&self) -> bool {
+        true
+    }
+
+    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+        let [tooth, flank, width] = shape[..] else { return };
+        if flank * at.sense < 0.0 {
+            return;
+        }
+        let teeth = f64::from(rig.pair().teeth().0);
+        let mut v = (at.pitches - tooth).rem_euclid(teeth);
+        if v > 0.5 * teeth {
+            v -= teeth;
+        }
+        if v.abs() < width {
+            row[0] = -at.sense * (FRAC_PI_2 * v / width).cos().powi(2) / at.arm_mm;
+        }
+    }
+
+    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        let [tooth, flank, width] = shape[..] else { return Vec::new() };
+        vec![
+            Parameter::grid("tooth", tooth, ""),
+            Parameter::number("depth_mm", found.beta[0], found.std(0), "mm"),
+            Parameter::grid("width", width, "pitches"),
+            Parameter { name: "flank", value: Value::Text(if flank > 0.0 { "ccw" } else { "cw" }), std: None, unit: "" },
+        ]
+    }
+}

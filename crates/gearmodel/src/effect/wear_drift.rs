@@ -1,0 +1,37 @@
+//! Teeth wear, so that backlash grows with revolutions × load: dj = w Σ T·revolutions, TE = −dir·(dj/2) cos α/A.
+
+use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+
+/// Teeth wear, so that backlash grows with revolutions × load.
+pub(super) struct WearDrift;
+
+impl Effect for WearDrift {
+    fn name(&self) -> &'static str {
+        "wear_drift"
+    }
+
+    fn component(&self) -> &'static str {
+        "gear teeth"
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(Carrier::None, Parity::Odd).with_load(1.0).accumulating(Accumulates::PerRevolution)
+    }
+
+    fn one_sided(&self) -> bool {
+        true
+    }
+
+    fn evolves(&self) -> bool {
+        true
+    }
+
+    fn row(&self, rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        let work_rev_nm: f64 = at.ledger.load_nm.iter().zip(&at.ledger.way_rev).map(|(load, way)| load * way).sum();
+        row[0] = -at.sense * 0.5 * rig.pair().pressure_angle_rad().cos() * work_rev_nm / at.arm_mm;
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        vec![Parameter::number("dj_mm_per_rev_nm", found.beta[0], found.std(0), "mm/(rev.N.m)")]
+    }
+}

@@ -1,0 +1,255 @@
+//! Repeatability: what differs between revolutions and runs of one condition.
+//!
+//! Residual of a place = model + run's waves + revolution's waves + white noise. The waves are the low orders of the driver's
+//! turn, 0 … [`ORDERS`]; wave n has variance λ_n between revolutions and κ λ_n between runs, white noise σ²/samples. With
+//! Z the waves at the places, V = σ²W⁻¹ + Z Λ Zᵀ (+ the same across a run), inverted by Woodbury's identity on the sums
+//! of the pool. Samples are not independent: treated as such, a null campaign shows false effects more often than not.
+
+use nalgebra::{Cholesky, DMatrix};
+
+use super::grid::Grid;
+use super::pool::Pool;
+
+/// Highest order of the driver's turn that scatters.
+pub(super) const ORDERS: usize = 8;
+/// Waves: the constant, and cosine and sine of every order.
+pub(super) const WAVES: usize = 2 * ORDERS + 1;
+/// Least scatter taken of an order, rad: a hundredth of the finest rig's.
+const LEAST_SCATTER_RAD: f64 = 3e-8;
+/// Coverage from which a revolution's waves are well determined.
+const FULL: f64 = 0.9;
+
+/// Waves of unit RMS at an angle.
+pub(super) fn waves(theta1_rad: f64) -> [f64; WAVES] {
+    let mut z = [1.0; WAVES];
+    for order in 1..=ORDERS {
+        let (sin, cos) = (order as f64 * theta1_rad).sin_cos();
+        z[2 * order - 1] = std::f64::consts::SQRT_2 * cos;
+        z[2 * order] = std::f64::consts::SQRT_2 * sin;
+    }
+    z
+}
+
+/// Order of a wave.
+fn order(wave: usize) -> usize {
+    wave.div_ceil(2)
+}
+
+/// Variances of the noise.
+#[derive(Clone, Debug)]
+pub struct Noise {
+    /// White, a sample, rad².
+    pub white_rad2: f64,
+    /// Between revolutions, by order, rad² of each wave.
+    pub order_rad2: [f64; ORDERS + 1],
+    /// Between runs, in parts of that between revolutions; of order 0 and of the others.
+    pub run_ratio: [f64; 2],
+    /// Independent differences from which the revolutions' scatter was estimated; 0 where it was assumed.
+    pub freedom: f64,
+}
+
+/// Everything a fit needs under one noise.
+pub struct Whitened {
+    /// XᵀV⁻¹X of all columns of the pool.
+    pub gram: DMatrix<f64>,
+    /// log det V + constant.
+    pub log_det: f64,
+}
+
+impl Noise {
+    /// Estimates the scatter from what differs between revolutions of a run after the model `amplitudes` (column,
+    /// amplitude) is taken off.
+    #[must_use]
+    pub fn estimate(grid: &Grid, pool: &Pool, amplitudes: &[(usize, f64)]) -> Self {
+        let residual_waves: Vec<_> = pool
+            .waves
+            .iter()
+            .map(|c| {
+                let mut e = c.column(0).into_owned();
+                for (column, amplitude) in amplitudes {
+                    e.axpy(-amplitude, &c.column(*column), 1.0);
+                }
+                e
+            })
+            .collect();
+        let fitted: Vec<Option<_>> = grid
+            .revolutions
+            .iter()
+            .zip(&pool.wave_products)
+            .zip(&residual_waves)
+            .map(|((revolution, k), e)| {
+                (revolution.coverage >= FULL).then(|| Cholesky::new(k.clone()).map(|c| c.solve(e))).flatten()
+            })
+            .collect();
+        let trace = pool.trace(grid, amplitudes);
+        let rest: Vec<f64> = grid.rho_rad.iter().zip(&trace).map(|(y, m)| y - m).collect();
+        let (white_rad2, weight) = white(grid, &fitted, &rest);
+        // Squared differences between neighbouring revolutions, by order.
+        let mut squares: Vec<Vec<f64>> = vec![Vec::new(); ORDERS + 1];
+        for run in 0..grid.directions.len() {
+            let numbers: Vec<usize> =
+                (0..grid.revolutions.len()).filter(|n| grid.revolutions[*n].run == run && fitted[*n].is_some()).collect();
+            let differences: Vec<_> = numbers
+                .windows(2)
+                .filter_map(|pair| Some(fitted[pair[1]].as_ref()? - fitted[pair[0]].as_ref()?))
+                .collect();
+            // What grows evenly is drift, not scatter: where there are enough differences their mean is taken off order 0.
+            let mean = if differences.len() >= 3 {
+                differences.iter().map(|d| d[0]).sum::<f64>() / differences.len() as f64
+            } else {
+                0.0
+            };
+            let shrink = if differences.len() >= 3 { 1.0 - 1.0 / differences.len() as f64 } else { 1.0 };
+            for difference in &differences {
+                squares[0].push((difference[0] - mean).powi(2) / shrink);
+                for wave in 1..WAVES {
+                    squares[order(wave)].push(difference[wave].powi(2));
+                }
+            }
+        }
+        let of_white = white_rad2 / weight.max(1.0);
+        let mut order_rad2 = [0.0; ORDERS + 1];
+        for (variance, squares) in order_rad2.iter_mut().zip(&mut squares) {
+            *variance = scatter(squares, of_white);
+        }
+        let freedom = squares.iter().map(Vec::len).sum::<usize>() as f64;
+        if freedom == 0.0 {
+            // One revolution a run: nothing says how well it repeats. As much scatter as white noise in a tenth of a turn.
+            order_rad2 = std::array::from_fn(|n| 10.0 * of_white / (1.0 + n as f64));
+        }
+        Self { white_rad2, order_rad2, run_ratio: [0.3; 2], freedom }
+    }
+
+    /// RMS of what does not repeat, as a sample shows it, rad.
+    #[must_use]
+    pub fn floor_rad2(&self) -> f64 {
+        let between = |n: usize| self.order_rad2[n] * (1.0 + self.run_ratio[usize::from(n > 0)]);
+        between(0) + (1..=ORDERS).map(|n| 2.0 * between(n)).sum::<f64>()
+    }
+
+    /// XᵀV⁻¹X and log det V.
+    #[must_use]
+    pub fn whiten(&self, grid: &Grid, pool: &Pool) -> Whitened {
+        self.whiten_runs(grid, pool, None)
+    }
+
+    /// The same of one run alone where `only` names it.
+    #[must_use]
+    pub fn whiten_runs(&self, grid: &Grid, pool: &Pool, only: Option<&[usize]>) -> Whitened {
+        let width = pool.width();
+        let columns: Vec<usize> = only.map_or_else(|| (0..width).collect(), <[usize]>::to_vec);
+        let p = columns.len();
+        let precision = 1.0 / self.white_rad2;
+        let lambda: Vec<f64> =
+            (0..WAVES).map(|w| self.order_rad2[order(w)].max(LEAST_SCATTER_RAD * LEAST_SCATTER_RAD)).collect();
+        let mut gram = if only.is_none() {
+            &pool.products * precision
+        } else {
+            DMatrix::from_fn(p, p, |a, b| pool.products[(columns[a], columns[b])] * precision)
+        };
+        let mut log_det = -grid.weight.iter().map(|w| (w * precision).ln()).sum::<f64>();
+        let runs = grid.directions.len();
+        let mut rows = DMatrix::zeros((grid.revolutions.len() + runs) * WAVES, p);
+        for run in 0..runs {
+            let mut run_gram = DMatrix::zeros(WAVES, WAVES);
+            let mut run_waves = DMatrix::zeros(WAVES, p);
+            for (number, revolution) in grid.revolutions.iter().enumerate().filter(|(_, r)| r.run == run) {
+                debug_assert!(!revolution.places.is_empty());
+                let k = &pool.wave_products[number] * precision;
+                let c = if only.is_none() {
+                    &pool.waves[number] * precision
+                } else {
+                    DMatrix::from_fn(WAVES, p, |w, n| pool.waves[number][(w, columns[n])] * precision)
+                };
+                let mut inner = k.clone();
+                for (n, l) in lambda.iter().enumerate() {
+                    inner[(n, n)] += 1.0 / l;
+                }
+                let Some(cholesky) = Cholesky::new(inner) else { continue };
+                log_det += 2.0 * cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
+                    + lambda.iter().map(|l| l.ln()).sum::<f64>();
+                let solved_k = cholesky.solve(&k);
+                run_gram += &k - &k * &solved_k;
+                let solved_c = cholesky.solve(&c);
+                run_waves += &c - &k * solved_c;
+                // CᵀS C = (L⁻¹C)ᵀ(L⁻¹C)
+                if let Some(half) = cholesky.l().solve_lower_triangular(&c) {
+                    rows.view_mut((number * WAVES, 0), (WAVES, p)).copy_from(&half);
+                }
+            }
+            let mut inner = run_gram;
+            let between: Vec<f64> =
+                lambda.iter().enumerate().map(|(n, l)| l * self.run_ratio[usize::from(n > 0)].max(1e-9)).collect();
+            for (n, l) in between.iter().enumerate() {
+                inner[(n, n)] += 1.0 / l;
+            }
+            let Some(cholesky) = Cholesky::new(inner) else { continue };
+            log_det += 2.0 * cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
+                + between.iter().map(|l| l.ln()).sum::<f64>();
+            if let Some(half) = cholesky.l().solve_lower_triangular(&run_waves) {
+                rows.view_mut(((grid.revolutions.len() + run) * WAVES, 0), (WAVES, p)).copy_from(&half);
+            }
+        }
+        gram -= rows.tr_mul(&rows);
+        Whitened { gram, log_det }
+    }
+}
+
+/// White noise a sample, rad², from places of neighbouring revolutions of a run freed of their waves; from neighbouring places
+/// where runs have one revolution. With it the mean sum of weights of a revolution.
+fn white(grid: &Grid, fitted: &[Option<nalgebra::DVector<f64>>], rest: &[f64]) -> (f64, f64) {
+    let mut squares = 0.0;
+    let mut count = 0.0;
+    let closes = grid.cells.len() < grid.places.len();
+    let deviation = |number: usize, place: usize| {
+        let z = waves(grid.places[place].theta1_rad);
+        let low: f64 = fitted[number].as_ref().map_or(0.0, |u| z.iter().zip(u.iter()).map(|(z, u)| z * u).sum());
+        rest[place] - low
+    };
+    for number in 1..grid.revolutions.len() {
+        let (before, after) = (&grid.revolutions[number - 1], &grid.revolutions[number]);
+        if !closes || before.run != after.run || fitted[number - 1].is_none() || fitted[number].is_none() {
+            continue;
+        }
+        let mut other = before.places.clone().peekable();
+        for place in after.places.clone() {
+            while other.peek().is_some_and(|p| grid.cell_of[*p] < grid.cell_of[place]) {
+                other.next();
+            }
+            if let Some(mate) = other.peek().copied().filter(|p| grid.cell_of[*p] == grid.cell_of[place]) {
+                let difference = deviation(number, place) - deviation(number - 1, mate);
+                squares += difference * difference / (1.0 / grid.weight[place] + 1.0 / grid.weight[mate]);
+                count += 1.0;
+            }
+        }
+    }
+    let weight = grid.weight.iter().sum::<f64>() / grid.revolutions.len().max(1) as f64;
+    if count < 100.0 {
+        // Second differences along the turn: blind to what is smooth over three bins.
+        (squares, count) = (0.0, 0.0);
+        for revolution in &grid.revolutions {
+            for n in revolution.places.start + 1..revolution.places.end.saturating_sub(1) {
+                let (a, b, c) = (grid.weight[n - 1], grid.weight[n], grid.weight[n + 1]);
+                let difference = rest[n] - 0.5 * (rest[n - 1] + rest[n + 1]);
+                squares += difference * difference / (1.0 / b + 0.25 / a + 0.25 / c);
+                count += 1.0;
+            }
+        }
+    }
+    let floor = 1e-9_f64;
+    ((squares / f64::max(count, 1.0)).max(floor * floor), weight)
+}
+
+/// Variance from squared differences of two: robust against few large ones (steps, knocks), less what is white noise's.
+fn scatter(squares: &mut [f64], of_white: f64) -> f64 {
+    let least = LEAST_SCATTER_RAD * LEAST_SCATTER_RAD;
+    if squares.is_empty() {
+        return least;
+    }
+    squares.sort_by(f64::total_cmp);
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    // Median of χ²(1) is 0.4549.
+    let middle = 0.5 * (squares[(squares.len() - 1) / 2] + squares[squares.len() / 2]) / 0.4549;
+    let robust = if squares.len() >= 8 { mean.min(2.0 * middle) } else { mean };
+    (0.5 * robust - of_white).max(0.02 * of_white).max(least)
+}

@@ -1,0 +1,204 @@
+//! Search over sets of blocks: several starts, additions, removals and swaps, until none raises the posterior.
+
+use std::collections::HashMap;
+
+use super::evidence::{Fit, fit, scan};
+use super::noise::Whitened;
+use super::pool::{Cause, Pool};
+
+/// Prior odds that an effect of the library is there, before its shape is chosen.
+const EFFECT_ODDS: f64 = 0.04;
+/// Prior odds that any pattern outside the library is there, shared by all of them.
+const UNKNOWN_ODDS: f64 = 0.15;
+/// Most blocks of a set.
+const LARGEST_SET: usize = 8;
+/// How many of the best candidates are tried exactly.
+const TRIED: usize = 5;
+/// Starts beside the empty set.
+const STARTS: usize = 4;
+
+/// A set with its log posterior, not normalised.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The fit.
+    pub fit: Fit,
+    /// Log evidence + log prior.
+    pub score: f64,
+}
+
+/// Everything seen on the way.
+pub struct Search<'a> {
+    pool: &'a Pool,
+    whitened: &'a Whitened,
+    /// Constant of this noise: what the evidence of the empty set lacks.
+    offset: f64,
+    priors: Vec<f64>,
+    seen: HashMap<Vec<usize>, Option<Model>>,
+}
+
+impl<'a> Search<'a> {
+    /// A search in a pool under one noise.
+    #[must_use]
+    pub fn new(pool: &'a Pool, whitened: &'a Whitened) -> Self {
+        let unknowns = pool.blocks.iter().filter(|b| matches!(b.cause, Cause::Unknown(_))).count().max(1) as f64;
+        let priors = pool
+            .blocks
+            .iter()
+            .map(|block| match &block.cause {
+                Cause::Effect { choices, .. } => EFFECT_ODDS.ln() - (*choices as f64).powf(0.8).ln(),
+                Cause::Unknown(_) => UNKNOWN_ODDS.ln() - unknowns.ln(),
+            })
+            .collect();
+        let offset = -0.5 * whitened.log_det - 0.5 * whitened.gram[(0, 0)];
+        Self { pool, whitened, offset, priors, seen: HashMap::new() }
+    }
+
+    fn library(&self, block: usize) -> Option<usize> {
+        match &self.pool.blocks[block].cause {
+            Cause::Effect { number, .. } => Some(*number),
+            Cause::Unknown(_) => None,
+        }
+    }
+
+    /// The model of a set; fitted once.
+    pub fn model(&mut self, mut set: Vec<usize>, near: Option<&Fit>) -> Option<Model> {
+        set.sort_unstable();
+        if let Some(known) = self.seen.get(&set) {
+            return known.clone();
+        }
+        let start: Vec<f64> = set
+            .iter()
+            .map(|b| {
+                near.and_then(|fit| fit.set.iter().position(|x| x == b).map(|n| fit.scales_rad[n])).unwrap_or(3e-5)
+            })
+            .collect();
+        let model = fit(self.pool, self.whitened, &set, &start).map(|fit| {
+            let prior: f64 = set.iter().map(|b| self.priors[*b]).sum();
+            Model { score: self.offset + fit.log_evidence + prior, fit }
+        });
+        self.seen.insert(set, model.clone());
+        model
+    }
+
+    /// Candidates that may join a set: one shape of an effect at a time.
+    fn open(&self, set: &[usize], unknown: bool) -> Vec<usize> {
+        (0..self.pool.blocks.len())
+            .filter(|b| !set.contains(b))
+            .filter(|b| match self.library(*b) {
+                Some(number) => !set.iter().any(|s| self.library(*s) == Some(number)),
+                None => unknown,
+            })
+            .collect()
+    }
+
+    /// The best additions to a model: (block, score by the scan).
+    fn additions(&self, model: &Model, unknown: bool, count: usize) -> Vec<(usize, f64)> {
+        let candidates = self.open(&model.fit.set, unknown);
+        let gains = scan(self.pool, self.whitened, &model.fit, &candidates);
+        let mut ranked: Vec<(usize, f64)> =
+            candidates.iter().zip(gains).map(|(b, gain)| (*b, model.score + gain + self.priors[*b])).collect();
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+        ranked.truncate(count);
+        ranked
+    }
+
+    /// Climbs from a set to where no addition, removal or swap raises the posterior.
+    pub fn climb(&mut self, start: Vec<usize>, unknown: bool) -> Option<Model> {
+        let mut best = self.model(start, None)?;
+        for _ in 0..40 {
+            let mut next = best.clone();
+            let mut consider = |search: &mut Self, set: Vec<usize>, near: &Fit| {
+                if let Some(model) = search.model(set, Some(near))
+                    && model.score > next.score + 1e-6
+                {
+                    next = model;
+                }
+            };
+            if best.fit.set.len() < LARGEST_SET {
+                for (block, score) in self.additions(&best, unknown, TRIED) {
+                    if score > best.score - 3.0 {
+                        consider(self, with(&best.fit.set, block), &best.fit);
+                    }
+                }
+            }
+            for n in 0..best.fit.set.len() {
+                let mut set = best.fit.set.clone();
+                set.remove(n);
+                let Some(fewer) = self.model(set.clone(), Some(&best.fit)) else { continue };
+                consider(self, set.clone(), &best.fit);
+                for (block, score) in self.additions(&fewer, unknown, TRIED) {
+                    if score > best.score - 3.0 {
+                        consider(self, with(&set, block), &best.fit);
+                    }
+                }
+            }
+            if next.score <= best.score + 1e-6 {
+                break;
+            }
+            best = next;
+        }
+        Some(best)
+    }
+
+    /// The best model: the library first from several starts, then with patterns outside it.
+    pub fn run(&mut self) -> Option<Model> {
+        let empty = self.model(Vec::new(), None)?;
+        let mut best = self.climb(Vec::new(), false)?;
+        for (block, score) in self.additions(&empty, false, STARTS) {
+            if score < empty.score - 2.0 {
+                continue;
+            }
+            if let Some(model) = self.climb(vec![block], false)
+                && model.score > best.score
+            {
+                best = model;
+            }
+        }
+        let mut with_unknown = self.climb(best.fit.set.clone(), true)?;
+        // And the other way round: what lies outside may be the larger part.
+        if let Some((block, score)) = self.additions(&empty, true, 1).into_iter().next()
+            && score > empty.score
+            && self.library(block).is_none()
+            && let Some(model) = self.climb(vec![block], true)
+            && model.score > with_unknown.score
+        {
+            with_unknown = model;
+        }
+        Some(with_unknown)
+    }
+
+    /// Looks around a model so that what competes with it has been seen: additions, removals, swaps.
+    pub fn explore(&mut self, best: &Model) {
+        let room = 9.0;
+        for (block, score) in self.additions(best, true, 60) {
+            if score > best.score - room {
+                self.model(with(&best.fit.set, block), Some(&best.fit));
+            }
+        }
+        for n in 0..best.fit.set.len() {
+            let mut set = best.fit.set.clone();
+            set.remove(n);
+            let Some(fewer) = self.model(set.clone(), Some(&best.fit)) else { continue };
+            for (block, score) in self.additions(&fewer, true, 40) {
+                if score > best.score - room {
+                    self.model(with(&set, block), Some(&best.fit));
+                }
+            }
+        }
+    }
+
+    /// All models seen, best first.
+    #[must_use]
+    pub fn models(&self) -> Vec<Model> {
+        let mut models: Vec<Model> = self.seen.values().flatten().cloned().collect();
+        models.sort_by(|a, b| b.score.total_cmp(&a.score).then_with(|| a.fit.set.cmp(&b.fit.set)));
+        models
+    }
+}
+
+fn with(set: &[usize], block: usize) -> Vec<usize> {
+    let mut set = set.to_vec();
+    set.push(block);
+    set.sort_unstable();
+    set
+}

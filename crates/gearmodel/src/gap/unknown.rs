@@ -1,0 +1,198 @@
+//! Patterns that no effect of the library makes: they compete in the evidence, so that what they are is not forced on an effect
+//! that merely resembles it.
+
+use std::f64::consts::TAU;
+
+use crate::effect::{Plan, Shaft, Station};
+
+/// How a pattern scales with the condition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weight {
+    /// Not at all.
+    One,
+    /// With the load over its mean.
+    Load,
+    /// With the speed over its mean.
+    Speed,
+    /// With time over the campaign, −1 to 1.
+    Time,
+}
+
+/// A pattern of columns.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pattern {
+    /// sin and cos of an order of a shaft.
+    Order {
+        /// Shaft.
+        shaft: Shaft,
+        /// Order; 0.5, 2.37 … for what does not close with the turn.
+        order: f64,
+        /// True where the sign turns with the sense.
+        odd: bool,
+        /// Scaling.
+        weight: Weight,
+        /// Mean of what it scales with.
+        mean: f64,
+    },
+    /// An order in one sense only.
+    OneSense {
+        /// Shaft.
+        shaft: Shaft,
+        /// Order; 0 is a constant.
+        order: u32,
+        /// Sense.
+        sense: f64,
+    },
+    /// A constant that scales with the condition.
+    Level {
+        /// True where the sign turns with the sense.
+        odd: bool,
+        /// Scaling.
+        weight: Weight,
+        /// Mean of what it scales with.
+        mean: f64,
+    },
+    /// A level a run, the first run's being the zero.
+    RunLevels {
+        /// Runs.
+        runs: usize,
+    },
+    /// A sine and cosine at a frequency of time.
+    Tone {
+        /// Frequency, Hz.
+        frequency_hz: f64,
+    },
+    /// A step at a time.
+    Step {
+        /// Time since the campaign's start, s.
+        time_s: f64,
+    },
+    /// Bumps along the driver's turn of a tooth's size that the others do not describe.
+    Bumps {
+        /// Number of bumps a turn.
+        count: usize,
+        /// True where the sign turns with the sense.
+        odd: bool,
+        /// Scaling.
+        weight: Weight,
+        /// Mean of what it scales with.
+        mean: f64,
+    },
+}
+
+impl Pattern {
+    /// The patterns tried under a plan.
+    #[must_use]
+    pub fn all(plan: &Plan) -> Vec<Self> {
+        let mut patterns = Vec::new();
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let both = plan.senses == [true, true];
+        let parities: &[bool] = if both { &[false, true] } else { &[false] };
+        let mut weights = vec![(Weight::One, 1.0)];
+        if plan.loads_nm.len() > 1 {
+            weights.push((Weight::Load, mean(&plan.loads_nm)));
+        }
+        if plan.speeds_rad_per_s.len() > 1 {
+            weights.push((Weight::Speed, mean(&plan.speeds_rad_per_s)));
+        }
+        if plan.revolutions > 2.0 {
+            weights.push((Weight::Time, plan.duration_s));
+        }
+        for &odd in parities {
+            for &(weight, mean) in &weights {
+                if weight != Weight::One {
+                    patterns.push(Self::Level { odd, weight, mean });
+                }
+                for shaft in [Shaft::Input, Shaft::Output] {
+                    for order in 1..=8 {
+                        patterns.push(Self::Order { shaft, order: f64::from(order), odd, weight, mean });
+                    }
+                }
+            }
+        }
+        if both {
+            patterns.push(Self::Level { odd: true, weight: Weight::One, mean: 1.0 });
+            for sense in [1.0, -1.0] {
+                for shaft in [Shaft::Input, Shaft::Output] {
+                    for order in 1..=4 {
+                        patterns.push(Self::OneSense { shaft, order, sense });
+                    }
+                }
+            }
+        }
+        if plan.runs > 2 {
+            patterns.push(Self::RunLevels { runs: plan.runs });
+        }
+        patterns
+    }
+
+    /// Columns.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        match self {
+            Self::Order { .. } | Self::Tone { .. } => 2,
+            Self::OneSense { order, .. } => if *order == 0 { 1 } else { 2 },
+            Self::Level { .. } | Self::Step { .. } => 1,
+            Self::RunLevels { runs } => runs - 1,
+            Self::Bumps { count, .. } => *count,
+        }
+    }
+
+    /// True where the pattern differs between revolutions of one condition.
+    #[must_use]
+    pub fn evolves(&self) -> bool {
+        match self {
+            Self::Order { order, weight, .. } => *weight == Weight::Time || order.fract() != 0.0,
+            Self::Level { weight, .. } => *weight == Weight::Time,
+            Self::Tone { .. } | Self::Step { .. } => true,
+            _ => false,
+        }
+    }
+
+    /// Values at a station.
+    pub fn row(&self, at: &Station, row: &mut [f64]) {
+        let scale = |weight: Weight, mean: f64, odd: bool| {
+            let size = match weight {
+                Weight::One => 1.0,
+                Weight::Load => at.load_nm / mean,
+                Weight::Speed => at.speed_rad_per_s.abs() / mean,
+                Weight::Time => 2.0 * at.time_s / mean - 1.0,
+            };
+            if odd { at.sense * size } else { size }
+        };
+        let angle = |shaft: Shaft| if shaft == Shaft::Input { at.theta1_rad } else { at.theta2_rad };
+        match self {
+            Self::Order { shaft, order, odd, weight, mean } => {
+                let gain = scale(*weight, *mean, *odd);
+                let (sin, cos) = (order * angle(*shaft)).sin_cos();
+                row[0] = gain * sin;
+                row[1] = gain * cos;
+            }
+            Self::OneSense { shaft, order, sense } => {
+                if at.sense * sense > 0.0 {
+                    let (sin, cos) = (f64::from(*order) * angle(*shaft)).sin_cos();
+                    row[0] = cos;
+                    if *order > 0 {
+                        row[1] = sin;
+                    }
+                }
+            }
+            Self::Level { odd, weight, mean } => row[0] = scale(*weight, *mean, *odd),
+            Self::RunLevels { .. } => {
+                if at.run > 0 {
+                    row[at.run - 1] = 1.0;
+                }
+            }
+            Self::Tone { frequency_hz } => {
+                let (sin, cos) = (TAU * frequency_hz * at.time_s).sin_cos();
+                row[0] = sin;
+                row[1] = cos;
+            }
+            Self::Step { time_s } => row[0] = f64::from(u8::from(at.time_s >= *time_s)),
+            Self::Bumps { count, odd, weight, mean } => {
+                let place = (at.theta1_rad / TAU).rem_euclid(1.0) * *count as f64;
+                row[(place as usize).min(count - 1)] = scale(*weight, *mean, *odd);
+            }
+        }
+    }
+}
