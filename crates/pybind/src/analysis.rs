@@ -1,6 +1,6 @@
 //! `analyse`: TE of a recording over angle, revolution by revolution.
 
-use gearmodel::measure::{AngleGrid, Curve, Order, RunConditions, RunFigures, RunTe};
+use gearmodel::measure::{AngleGrid, Curve, Order, RunFigures, RunTe};
 use gearmodel::{Direction, GearPair as ModelPair, NominalModel};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use crate::array::record_array;
 use crate::error::{InputError, Result};
 use crate::pair::GearPair;
-use crate::recording::{OneSense, Recording};
+use crate::recording::Recording;
 
 /// Measured TE of a recording over the driver's angle, with its figures and the model's prediction.
 ///
@@ -30,18 +30,10 @@ pub struct Analysis {
 }
 
 /// TE of a recording of one sense, sample by sample.
-pub fn run_te(py: Python<'_>, recording: &OneSense<'_>, pair: &ModelPair, grid: AngleGrid) -> Result<RunTe> {
-    let theta1 = recording.theta1_rad.as_slice().map_err(PyErr::from)?;
-    let theta2 = recording.theta2_rad.as_slice().map_err(PyErr::from)?;
-    let conditions =
-        RunConditions { direction: recording.direction, load_nm: recording.load_nm, speed_rpm: recording.speed_rpm };
-    Ok(py.detach(|| {
-        let mut run = RunTe::new(grid, conditions);
-        for (theta1_rad, theta2_rad) in theta1.iter().zip(theta2) {
-            run.push(pair, *theta1_rad, *theta2_rad);
-        }
-        run
-    }))
+pub fn run_te(py: Python<'_>, recording: &Bound<'_, Recording>, pair: &ModelPair, grid: AngleGrid) -> Result<RunTe> {
+    let read = recording.get().read(py);
+    let recording = read.recording()?;
+    Ok(py.detach(|| recording.te(pair, grid))?)
 }
 
 /// TE of the model on the grid, rad.
@@ -84,9 +76,9 @@ pub fn analyse(
     if highest_order == 0 || highest_order as usize > limit {
         return Err(InputError::HighestOrder { given: highest_order, limit, bins }.into());
     }
-    let recording = rec.get().one_sense(py)?;
     let model = &pair.get().model;
-    let run = run_te(py, &recording, &model.pair, grid)?;
+    let run = run_te(py, rec, &model.pair, grid)?;
+    let conditions = run.conditions();
     let (figures, mean_curve, predicted, orders) = py.detach(|| {
         let mean_curve = run.mean_curve();
         let orders = Order::of(grid, &mean_curve, highest_order);
@@ -97,9 +89,9 @@ pub fn analyse(
         revolutions.push(mean_curve.values_rad.clone());
     }
     Ok(Analysis {
-        direction: recording.direction,
-        load_nm: recording.load_nm,
-        speed_rpm: recording.speed_rpm,
+        direction: conditions.direction,
+        load_nm: conditions.load_nm,
+        speed_rpm: conditions.speed_rpm,
         samples: run.samples(),
         gaps: run.rejected(),
         figures,
