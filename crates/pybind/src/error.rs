@@ -91,6 +91,12 @@ impl From<gearmodel::measure::MeasureError> for Raised {
     }
 }
 
+impl From<gearmodel::measure::SpectrumError> for Raised {
+    fn from(error: gearmodel::measure::SpectrumError) -> Self {
+        Self(PyValueError::new_err(error.to_string()))
+    }
+}
+
 impl From<gearmodel::tolerance::ToleranceError> for Raised {
     fn from(error: gearmodel::tolerance::ToleranceError) -> Self {
         use gearmodel::tolerance::ToleranceError;
@@ -171,6 +177,18 @@ pub enum InputError {
         limit: usize,
         /// Bins a turn.
         bins: usize,
+    },
+    /// An axis that does not exist.
+    #[error("axis {given:?} is unknown: write \"input\", \"output\" or \"mesh\"")]
+    Axis {
+        /// The text given.
+        given: String,
+    },
+    /// A shaft that does not exist.
+    #[error("shaft {given:?} is unknown: write \"input\" or \"output\"")]
+    Shaft {
+        /// The text given.
+        given: String,
     },
     /// A tooth number below 0, which no gear has.
     #[error("tooth {given} does not exist: teeth count from 0")]

@@ -265,16 +265,33 @@ impl<'a> Recording<'a> {
     /// # Errors
     /// As for [`Recording::one_sense`].
     pub fn te(&self, pair: &GearPair, grid: AngleGrid) -> Result<RunTe, RecordingError> {
+        let mut run = self.empty_run(grid)?;
+        for (theta1_rad, theta2_rad) in self.columns.theta1_rad.iter().zip(self.columns.theta2_rad.iter()) {
+            run.push(pair, *theta1_rad, *theta2_rad);
+        }
+        Ok(run)
+    }
+
+    /// [`Recording::te`] over the driven shaft's angle and revolutions: its mean curve is the synchronous average of the
+    /// driven shaft.
+    ///
+    /// # Errors
+    /// As for [`Recording::one_sense`].
+    pub fn te_over_driven(&self, pair: &GearPair, grid: AngleGrid) -> Result<RunTe, RecordingError> {
+        let mut run = self.empty_run(grid)?;
+        for (theta1_rad, theta2_rad) in self.columns.theta1_rad.iter().zip(self.columns.theta2_rad.iter()) {
+            run.push_over_driven(pair, *theta1_rad, *theta2_rad);
+        }
+        Ok(run)
+    }
+
+    fn empty_run(&self, grid: AngleGrid) -> Result<RunTe, RecordingError> {
         let conditions = RunConditions {
             direction: self.one_sense()?,
             load_nm: self.columns.load_nm.mean(),
             speed_rpm: self.columns.speed_rpm.mean(),
         };
-        let mut run = RunTe::new(grid, conditions);
-        for (theta1_rad, theta2_rad) in self.columns.theta1_rad.iter().zip(self.columns.theta2_rad.iter()) {
-            run.push(pair, *theta1_rad, *theta2_rad);
-        }
-        Ok(run)
+        Ok(RunTe::new(grid, conditions))
     }
 }
 

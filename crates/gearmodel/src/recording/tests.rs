@@ -120,3 +120,38 @@ fn speed_comes_from_the_motion_where_it_is_not_stated() {
     assert!(matches!(still.one_sense(), Err(RecordingError::Still { .. })));
     assert!(still.split().is_empty());
 }
+
+#[test]
+fn averages_keep_what_turns_with_their_shaft() {
+    // 3 : 1: 12 turns of the driver are 4 of the driven shaft; order 1 of each shaft, and noise-free.
+    let pair = GearPair::constant(3.0).unwrap();
+    let theta1_rad: Vec<f64> = (0..120_000).map(|i| f64::from(i) * 12.0 * TAU / 120_000.0).collect();
+    let (with_driver, with_driven) = (3e-5, 7e-5);
+    let mut columns = ramp();
+    columns.theta2_rad = theta1_rad
+        .iter()
+        .map(|theta1| {
+            let theta2 = theta1 / 3.0;
+            theta2 + with_driver * theta1.cos() + with_driven * theta2.sin()
+        })
+        .collect();
+    columns.time_s = (0..120_000).map(|i| f64::from(i) * 1e-3).collect();
+    columns.theta1_rad = theta1_rad.into();
+    let recording = Recording::new(columns).unwrap();
+    let grid = AngleGrid::default();
+    let worst = |run: &RunTe, expected: fn(f64) -> f64| {
+        let curve = run.mean_curve();
+        grid.centres().zip(&curve.values_rad).map(|(angle, value)| (value - expected(angle)).abs()).fold(0.0, f64::max)
+    };
+    let driver = recording.te(&pair, grid).unwrap();
+    assert_eq!(driver.revolutions(), 12);
+    // Order 1 of the driven shaft is a third of a period a turn of the driver: it averages out over three turns.
+    // What is left stands in the first and last bin: a revolution that does not close has no slope across its ends.
+    let off = worst(&driver, |theta1| 3e-5 * theta1.cos());
+    assert!(off < 3e-7, "{off}");
+    let driven = recording.te_over_driven(&pair, grid).unwrap();
+    assert_eq!(driven.revolutions(), 4);
+    // Order 3 of the driven shaft is order 1 of the driver: a whole order of both.
+    let off = worst(&driven, |theta2| 3e-5 * (3.0 * theta2).cos() + 7e-5 * theta2.sin());
+    assert!(off < 2e-8, "{off}");
+}
