@@ -13,7 +13,7 @@
 //!   same positive sense of θ2, so that backlash = TE_cw − TE_ccw at equal θ1.
 //!
 //! Reading order: [`pitch_curve`] → [`GearPair`] → [`increment`] → [`NominalModel`] (the model, first order) → [`contact`] (the
-//! model, exact) → [`loaded`]; [`measure`] (the measurement). The theory stands in [`theory`], page by page.
+//! model, exact) → [`loaded`]; [`recording`] → [`measure`] (the measurement). The theory stands in [`theory`], page by page.
 
 pub mod contact;
 mod direction;
@@ -32,6 +32,7 @@ mod pair;
 mod pair_file;
 pub mod phase;
 pub mod pitch_curve;
+pub mod recording;
 pub mod sensitivity;
 mod spec;
 pub mod sweep;

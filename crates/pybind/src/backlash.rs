@@ -1,12 +1,11 @@
 //! `backlash_from`: measured backlash over angle, with its interval.
 
-use gearmodel::measure::{AngleGrid, BacklashCurve, RunFigures, RunTe};
-use gearmodel::{Direction, NominalModel};
+use gearmodel::measure::{AngleGrid, MeasuredBacklash as ModelBacklash};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
 use crate::analysis::{predicted, run_te};
-use crate::error::{InputError, Result};
+use crate::error::Result;
 use crate::pair::GearPair;
 use crate::recording::Recording;
 
@@ -61,19 +60,10 @@ pub fn backlash_from(
 ) -> Result<MeasuredBacklash> {
     let grid = AngleGrid::new(bins)?;
     let model = &pair.get().model;
-    let run = |argument, recording: &Bound<'_, Recording>, needed: Direction| -> Result<RunTe> {
-        let recording = recording.get().one_sense(py)?;
-        if recording.direction != needed {
-            return Err(InputError::Sense { argument, found: recording.direction }.into());
-        }
-        run_te(py, &recording, &model.pair, grid)
-    };
-    let (ccw, cw) = (run("ccw", ccw, Direction::Ccw)?, run("cw", cw, Direction::Cw)?);
-    let measured = BacklashCurve::of(&ccw.mean_curve(), &cw.mean_curve())?;
-    if measured.curve.coverage() == 0.0 {
-        return Err(InputError::NoCommonAngle.into());
-    }
-    let half_width_rad = half_width(&ccw, &cw, model);
+    let (ccw, cw) = (run_te(py, ccw, &model.pair, grid)?, run_te(py, cw, &model.pair, grid)?);
+    let measured = ModelBacklash::of(&ccw, &cw)?;
+    let half_width_rad = measured.half_width_rad;
+    let measured = measured.backlash;
     let array = |values: &mut dyn Iterator<Item = f64>| PyArray1::from_iter(py, values).unbind();
     let values = &measured.curve.values_rad;
     let predicted_senses = (predicted(model, &cw), predicted(model, &ccw));
@@ -90,44 +80,6 @@ pub fn backlash_from(
         max_rad: measured.max_rad,
         half_width_rad,
     })
-}
-
-/// Half of the 90 % interval at a bin, rad: t₀.₉₅ · √(Σ over both senses of floor² + s²(means)/R).
-///
-/// The floor is the repeatability of a mean curve at a bin, pooled over the bins, each revolution less its own mean; the
-/// means' own scatter about their slope adds to it. The degrees of freedom are those of the means, the fewer.
-fn half_width(ccw: &RunTe, cw: &RunTe, model: &NominalModel) -> f64 {
-    let (mut variance, mut freedom) = (0.0, 0.0);
-    for run in [ccw, cw] {
-        let floor_rad = RunFigures::of(run, model, None).floor_rms_rad;
-        let means: Vec<f64> = run.whole_revolutions().map(|(_, curve)| curve.mean_rad()).collect();
-        let count = means.len() as f64;
-        let mean = means.iter().sum::<f64>() / count;
-        let scatter = means.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        variance += floor_rad * floor_rad + scatter / count;
-        freedom += count - 1.0;
-    }
-    student_95(freedom) * variance.sqrt()
-}
-
-/// The 95 % quantile of Student's t: tabulated to 2 degrees of freedom, then Fisher's expansion about the normal quantile
-/// z (Abramowitz and Stegun 26.7.5), good to 0.3 %. NaN below 1.
-fn student_95(freedom: f64) -> f64 {
-    const Z: f64 = 1.644_853_6;
-    if freedom < 1.0 {
-        return f64::NAN;
-    }
-    if freedom < 2.0 {
-        return 6.313_752;
-    }
-    if freedom < 3.0 {
-        return 2.919_986;
-    }
-    let (z3, z5, z7) = (Z.powi(3), Z.powi(5), Z.powi(7));
-    let g1 = (z3 + Z) / 4.0;
-    let g2 = (5.0 * z5 + 16.0 * z3 + 3.0 * Z) / 96.0;
-    let g3 = (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * Z) / 384.0;
-    Z + g1 / freedom + g2 / freedom.powi(2) + g3 / freedom.powi(3)
 }
 
 #[pymethods]

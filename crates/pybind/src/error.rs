@@ -91,6 +91,12 @@ impl From<gearmodel::measure::MeasureError> for Raised {
     }
 }
 
+impl From<gearmodel::measure::SpectrumError> for Raised {
+    fn from(error: gearmodel::measure::SpectrumError) -> Self {
+        Self(PyValueError::new_err(error.to_string()))
+    }
+}
+
 impl From<gearmodel::tolerance::ToleranceError> for Raised {
     fn from(error: gearmodel::tolerance::ToleranceError) -> Self {
         use gearmodel::tolerance::ToleranceError;
@@ -101,8 +107,8 @@ impl From<gearmodel::tolerance::ToleranceError> for Raised {
     }
 }
 
-impl From<crate::recording::check::RecordingError> for Raised {
-    fn from(error: crate::recording::check::RecordingError) -> Self {
+impl From<gearmodel::recording::RecordingError> for Raised {
+    fn from(error: gearmodel::recording::RecordingError) -> Self {
         Self(PyValueError::new_err(error.to_string()))
     }
 }
@@ -162,19 +168,6 @@ pub enum InputError {
         /// The text given.
         given: String,
     },
-    /// Backlash needs one recording of each sense.
-    #[error(
-        "{argument} was recorded {found}: backlash_from(ccw, cw, pair) needs the ccw recording first, then the cw one"
-    )]
-    Sense {
-        /// The argument.
-        argument: &'static str,
-        /// Its direction.
-        found: gearmodel::Direction,
-    },
-    /// Recordings that share no angle.
-    #[error("the two recordings share no bin of theta1: record overlapping angles in both senses, or take fewer bins")]
-    NoCommonAngle,
     /// An order beyond what the grid resolves.
     #[error("highest_order = {given} is outside 1 to {limit}: {bins} bins a turn resolve no more; take more bins")]
     HighestOrder {
@@ -184,6 +177,18 @@ pub enum InputError {
         limit: usize,
         /// Bins a turn.
         bins: usize,
+    },
+    /// An axis that does not exist.
+    #[error("axis {given:?} is unknown: write \"input\", \"output\" or \"mesh\"")]
+    Axis {
+        /// The text given.
+        given: String,
+    },
+    /// A shaft that does not exist.
+    #[error("shaft {given:?} is unknown: write \"input\" or \"output\"")]
+    Shaft {
+        /// The text given.
+        given: String,
     },
     /// A tooth number below 0, which no gear has.
     #[error("tooth {given} does not exist: teeth count from 0")]

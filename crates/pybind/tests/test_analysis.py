@@ -83,6 +83,7 @@ def test_bins_and_orders_are_checked(pair):
         gm.analyse(rec, pair, bins=3)
     with pytest.raises(ValueError, match="highest_order = 360"):
         gm.analyse(rec, pair, highest_order=360)
+    assert len(gm.analyse(rec, pair, bins=90).spectrum) == 44
 
 
 def test_backlash_and_its_interval(errors):

@@ -111,7 +111,7 @@ impl RunFigures {
 
 /// √(mean over the bins of s²/R), s² the variance between the R revolutions that saw the bin, each less its own mean: an
 /// offset that accumulates is no scatter and has a figure of its own.
-fn floor_rms(revolutions: &[(usize, Curve)]) -> f64 {
+pub(super) fn floor_rms(revolutions: &[(usize, Curve)]) -> f64 {
     let Some((_, first)) = revolutions.first() else {
         return f64::NAN;
     };

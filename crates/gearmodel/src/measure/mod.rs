@@ -4,6 +4,7 @@ mod backlash;
 mod figures;
 mod floor;
 mod grid;
+mod measured_backlash;
 mod order;
 mod run_te;
 mod spectrum;
@@ -13,6 +14,7 @@ pub use backlash::BacklashCurve;
 pub use figures::{RunFigures, common_zero};
 pub use floor::{FloorError, RepeatabilityFloor};
 pub use grid::{AngleGrid, Curve};
+pub use measured_backlash::MeasuredBacklash;
 pub use order::Order;
 pub use run_te::{RunConditions, RunTe, TePoint};
 pub use spectrum::{OrderAxis, OrderSpectrum, SpectrumError, SpectrumLine};
@@ -42,4 +44,15 @@ pub enum MeasureError {
         /// Bins of the cw curve.
         cw: usize,
     },
+    /// Backlash needs one run of each sense.
+    #[error("{place} was recorded {found}: backlash needs the ccw recording first, then the cw one")]
+    Sense {
+        /// The place it was given at.
+        place: &'static str,
+        /// Its direction.
+        found: crate::Direction,
+    },
+    /// Runs that share no angle.
+    #[error("the two recordings share no bin of theta1: record overlapping angles in both senses, or take fewer bins")]
+    NoCommonAngle,
 }

@@ -17,7 +17,7 @@ pub struct RunConditions {
 /// The first raw sample past a bin's edge, neither averaged nor interpolated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TePoint {
-    /// Bin of θ1, 0..bins.
+    /// Bin of θ1, or of θ2 where the bins are the driven shaft's, 0..bins.
     pub bin: usize,
     /// Revolution of the run, counted up from 0 in both senses.
     pub revolution: i32,
@@ -36,7 +36,7 @@ const MAX_ANGLE_RAD: f64 = 1e9;
 #[derive(Clone, Copy, Debug, Default)]
 struct BinSum {
     count: u32,
-    /// Σ (θ1 − bin centre), rad.
+    /// Σ (angle − bin centre), rad.
     offset_rad: f64,
     /// Σ (TE − the run's first TE), rad: the subtraction keeps the sums short when the zero is far off.
     te_rad: f64,
@@ -96,18 +96,30 @@ impl RunTe {
     /// A sample that is not finite, or beyond 10⁹ rad, is counted in [`RunTe::rejected`] and otherwise ignored.
     #[inline]
     pub fn push(&mut self, pair: &GearPair, theta1_rad: f64, theta2_rad: f64) -> Option<TePoint> {
+        self.take(theta1_rad, pair, theta1_rad, theta2_rad)
+    }
+
+    /// [`RunTe::push`] with bins and revolutions of the driven shaft: the angle of the bins is θ2, so that what turns with
+    /// the driven shaft stays and everything else averages out. A run is fed by one of the two.
+    #[inline]
+    pub fn push_over_driven(&mut self, pair: &GearPair, theta1_rad: f64, theta2_rad: f64) -> Option<TePoint> {
+        self.take(theta2_rad, pair, theta1_rad, theta2_rad)
+    }
+
+    #[inline]
+    fn take(&mut self, angle_rad: f64, pair: &GearPair, theta1_rad: f64, theta2_rad: f64) -> Option<TePoint> {
         let te_rad = theta2_rad - pair.theta2(theta1_rad);
-        if !te_rad.is_finite() || theta1_rad.abs() > MAX_ANGLE_RAD {
+        if !te_rad.is_finite() || theta1_rad.abs() > MAX_ANGLE_RAD || angle_rad.abs() > MAX_ANGLE_RAD {
             self.rejected += 1;
             return None;
         }
         self.samples += 1;
-        let bin = self.grid.unwrapped_bin_of(theta1_rad);
+        let bin = self.grid.unwrapped_bin_of(angle_rad);
         let opened = if bin == self.last_bin { None } else { self.enter(bin, theta1_rad, theta2_rad, te_rad) };
         let centre_rad = (bin as f64 + 0.5) * self.grid.width_rad();
         let sum = &mut self.revolutions[self.last_revolution].bins[self.last_wrapped];
         sum.count += 1;
-        sum.offset_rad += theta1_rad - centre_rad;
+        sum.offset_rad += angle_rad - centre_rad;
         sum.te_rad += te_rad - self.te_origin_rad;
         opened
     }

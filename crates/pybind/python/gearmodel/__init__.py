@@ -11,6 +11,7 @@ TE_cw - TE_ccw at equal theta1.
 1108.4 urad
 """
 
+from ._analysis import Floor, OrderSpectrum, Spectra, SynchronousAverage, Waves, WaveSplit
 from ._native import (
     Analysis,
     Errors,
@@ -39,22 +40,28 @@ __all__ = [
     "Analysis",
     "Errors",
     "Event",
+    "Floor",
     "GearPair",
     "GeometryError",
     "LoadedPair",
     "Log",
     "LogError",
     "MeasuredBacklash",
+    "OrderSpectrum",
     "Outline",
     "PhaseValue",
     "Phases",
     "Profile",
     "Recording",
+    "Spectra",
     "SweepTable",
+    "SynchronousAverage",
     "Tolerance",
     "ToleranceFigure",
     "ToothDamage",
     "ToothErrors",
+    "WaveSplit",
+    "Waves",
     "analyse",
     "backlash_from",
     "read_log",

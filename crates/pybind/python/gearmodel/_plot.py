@@ -32,7 +32,7 @@ def analysis(a: Analysis) -> Any:
     curve.plot(degrees, URAD * (a.predicted + a.zero_rad), "--", label="predicted, zero moved")
     curve.set(xlabel=DEGREES, ylabel="TE / urad", xlim=(0, 360), title=f"{a.direction}, {a.load_nm:g} N m, {a.speed_rpm:g} rpm")
     curve.legend()
-    orders.stem(a.spectrum.order, URAD * a.spectrum.amplitude_rad, markerfmt=" ", basefmt=" ")
+    orders.stem(a.spectrum.orders, URAD * a.spectrum.amplitude_rad, markerfmt=" ", basefmt=" ")
     orders.axhline(URAD * a.floor, color="0.5", linestyle=":", label="floor, rms")
     orders.set(xlabel="periods a turn of the driver", ylabel="amplitude / urad", yscale="log")
     orders.legend()

@@ -1,18 +1,18 @@
 //! `Recording`: the samples of a run, or of any two encoders.
 
-pub mod check;
-pub mod split;
 mod table;
 
+use std::borrow::Cow;
+
 use gearmodel::Direction;
+use gearmodel::recording::{self as model, Columns, RecordingError};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PySlice, PyTuple};
 
 use crate::array::{Numbers, array};
-use crate::error::Result;
-use check::{RecordingError, check_column, check_sense, check_time};
+use crate::error::{InputError, Result};
 
 /// Sampled angles of two shafts with their conditions: a run of a rig, or any drive with two encoders.
 ///
@@ -58,28 +58,18 @@ enum Condition {
 }
 
 impl Condition {
-    fn take(field: &'static str, given: &Bound<'_, PyAny>, samples: usize) -> Result<Self> {
-        if let Numbers::One(value) = Numbers::take(field, given)? {
-            if !value.is_finite() {
-                return Err(RecordingError::Condition { field, value }.into());
-            }
-            return Ok(Self::All(value));
-        }
-        let values = column(field, given)?;
-        check_column(field, values.readonly().as_slice().map_err(PyErr::from)?, samples, false)?;
-        Ok(Self::Each(values.unbind()))
+    fn take(field: &'static str, given: &Bound<'_, PyAny>) -> Result<Self> {
+        Ok(match Numbers::take(field, given)? {
+            Numbers::One(value) => Self::All(value),
+            Numbers::Many(_) => Self::Each(column(field, given)?.unbind()),
+        })
     }
 
-    /// The value, or the mean of the values: what the model is evaluated at.
-    fn mean(&self, py: Python<'_>) -> Result<f64> {
-        Ok(match self {
-            Self::All(value) => *value,
-            Self::Each(values) => {
-                let values = values.bind(py).readonly();
-                let values = values.as_slice().map_err(PyErr::from)?;
-                values.iter().sum::<f64>() / values.len() as f64
-            }
-        })
+    fn read<'py>(&self, py: Python<'py>) -> ReadCondition<'py> {
+        match self {
+            Self::All(value) => ReadCondition::All(*value),
+            Self::Each(values) => ReadCondition::Each(values.bind(py).readonly()),
+        }
     }
 
     fn object<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
@@ -105,7 +95,7 @@ fn column<'py>(field: &'static str, given: &Bound<'py, PyAny>) -> Result<Bound<'
     // A view, so that the caller's own array stays as writeable as it was.
     let view = values.call_method0(intern!(py, "view"))?;
     view.getattr(intern!(py, "flags"))?.setattr(intern!(py, "writeable"), false)?;
-    view.cast_into::<PyArray1<f64>>().map_err(|_| RecordingError::Dimensions { field, dimensions }.into())
+    view.cast_into::<PyArray1<f64>>().map_err(|_| InputError::Dimensions { field, dimensions }.into())
 }
 
 fn lines(field: &'static str, given: Option<i64>) -> Result<Option<u64>> {
@@ -117,65 +107,88 @@ fn lines(field: &'static str, given: Option<i64>) -> Result<Option<u64>> {
         .transpose()
 }
 
-/// Both angles of a recording of one sense, and what it was recorded at.
-pub struct OneSense<'py> {
-    /// θ1, rad.
-    pub theta1_rad: PyReadonlyArray1<'py, f64>,
-    /// θ2, rad.
-    pub theta2_rad: PyReadonlyArray1<'py, f64>,
-    /// The driver's sense.
-    pub direction: Direction,
-    /// Mean load, N·m.
-    pub load_nm: f64,
-    /// Mean speed, rpm.
-    pub speed_rpm: f64,
+/// The arrays of a recording, held for reading.
+pub struct Read<'py> {
+    time_s: PyReadonlyArray1<'py, f64>,
+    theta1_rad: PyReadonlyArray1<'py, f64>,
+    theta2_rad: PyReadonlyArray1<'py, f64>,
+    load_nm: ReadCondition<'py>,
+    speed_rpm: ReadCondition<'py>,
+    direction: Option<Direction>,
+    input_lines: Option<u64>,
+    output_lines: Option<u64>,
+}
+
+enum ReadCondition<'py> {
+    All(f64),
+    Each(PyReadonlyArray1<'py, f64>),
+}
+
+fn slice<'a>(values: &'a PyReadonlyArray1<'_, f64>) -> Result<Cow<'a, [f64]>> {
+    Ok(Cow::Borrowed(values.as_slice().map_err(PyErr::from)?))
+}
+
+impl ReadCondition<'_> {
+    fn condition(&self) -> Result<model::Condition<'_>> {
+        Ok(match self {
+            Self::All(value) => model::Condition::All(*value),
+            Self::Each(values) => model::Condition::Each(slice(values)?),
+        })
+    }
+}
+
+impl Read<'_> {
+    fn columns(&self) -> Result<Columns<'_>> {
+        Ok(Columns {
+            time_s: slice(&self.time_s)?,
+            theta1_rad: slice(&self.theta1_rad)?,
+            theta2_rad: slice(&self.theta2_rad)?,
+            load_nm: self.load_nm.condition()?,
+            speed_rpm: self.speed_rpm.condition()?,
+            direction: self.direction,
+            input_lines: self.input_lines,
+            output_lines: self.output_lines,
+        })
+    }
+
+    /// The recording as the model knows it; it borrows the arrays.
+    pub fn recording(&self) -> Result<model::Recording<'_>> {
+        // The caller may have written into his own arrays since: shape and numbers are looked at again.
+        Ok(model::Recording::of_log(self.columns()?)?)
+    }
 }
 
 impl Recording {
-    /// Columns that a log holds; they were checked when it was written and are checked again here.
+    /// Columns that a log holds.
     pub fn from_run(py: Python<'_>, run: riglog::RecordedRun, lines: Option<(u64, u64)>) -> Result<Self> {
         let column = |field, values: Vec<f64>| column(field, PyArray1::from_vec(py, values).as_any());
-        let (time_s, theta1_rad, theta2_rad) = (
-            column("time_s", run.time_s)?,
-            column("theta1_rad", run.theta1_rad)?,
-            column("theta2_rad", run.theta2_rad)?,
-        );
-        Ok(Self {
-            time_s: time_s.unbind(),
-            theta1_rad: theta1_rad.unbind(),
-            theta2_rad: theta2_rad.unbind(),
+        let this = Self {
+            time_s: column("time_s", run.time_s)?.unbind(),
+            theta1_rad: column("theta1_rad", run.theta1_rad)?.unbind(),
+            theta2_rad: column("theta2_rad", run.theta2_rad)?.unbind(),
             load_nm: Condition::All(run.load_nm),
             speed_rpm: Condition::All(run.speed_rpm),
             direction: Some(run.direction),
             input_lines: lines.map(|(input, _)| input),
             output_lines: lines.map(|(_, output)| output),
-        })
+        };
+        this.read(py).recording()?;
+        Ok(this)
     }
 
-    /// The angles, where the recording keeps one sense; a stated direction is believed.
-    pub fn one_sense<'py>(&self, py: Python<'py>) -> Result<OneSense<'py>> {
-        let theta1_rad = self.theta1_rad.bind(py).readonly();
-        let theta2_rad = self.theta2_rad.bind(py).readonly();
-        let direction = match self.direction {
-            Some(direction) => direction,
-            None => {
-                let theta1 = theta1_rad.as_slice().map_err(PyErr::from)?;
-                match py.detach(|| split::stretches(theta1)).as_slice() {
-                    [] => return Err(RecordingError::Still { limit_rad: split::REVERSAL_RAD }.into()),
-                    [only] => only.direction,
-                    [first, rest @ ..] => {
-                        return Err(RecordingError::Reverses { reversals: rest.len(), index: first.to }.into());
-                    }
-                }
-            }
-        };
-        Ok(OneSense {
-            theta1_rad,
-            theta2_rad,
-            direction,
-            load_nm: self.load_nm.mean(py)?,
-            speed_rpm: self.speed_rpm.mean(py)?,
-        })
+    /// The arrays, held for reading.
+    pub fn read<'py>(&self, py: Python<'py>) -> Read<'py> {
+        let array = |values: &Py<PyArray1<f64>>| values.bind(py).readonly();
+        Read {
+            time_s: array(&self.time_s),
+            theta1_rad: array(&self.theta1_rad),
+            theta2_rad: array(&self.theta2_rad),
+            load_nm: self.load_nm.read(py),
+            speed_rpm: self.speed_rpm.read(py),
+            direction: self.direction,
+            input_lines: self.input_lines,
+            output_lines: self.output_lines,
+        }
     }
 }
 
@@ -194,39 +207,20 @@ impl Recording {
         output_lines: Option<i64>,
     ) -> Result<Self> {
         let py = time_s.py();
-        let direction = match direction {
-            "auto" => None,
-            given => {
-                Some(given.parse::<Direction>().map_err(|_| RecordingError::Direction { given: given.to_owned() })?)
-            }
-        };
-        let time_s = column("time_s", time_s)?;
-        let samples = time_s.len();
-        let theta = [column("theta1_rad", theta1_rad)?, column("theta2_rad", theta2_rad)?];
-        {
-            let time = time_s.readonly();
-            let time = time.as_slice().map_err(PyErr::from)?;
-            py.detach(|| check_time(time))?;
-            for (field, values) in ["theta1_rad", "theta2_rad"].into_iter().zip(&theta) {
-                let values = values.readonly();
-                let values = values.as_slice().map_err(PyErr::from)?;
-                py.detach(|| {
-                    check_column(field, values, samples, true)?;
-                    direction.map_or(Ok(()), |direction| check_sense(field, values, direction))
-                })?;
-            }
-        }
-        let [theta1_rad, theta2_rad] = theta.map(Bound::unbind);
-        Ok(Self {
-            time_s: time_s.unbind(),
-            theta1_rad,
-            theta2_rad,
-            load_nm: Condition::take("load_nm", load_nm, samples)?,
-            speed_rpm: Condition::take("speed_rpm", speed_rpm, samples)?,
-            direction,
+        let this = Self {
+            time_s: column("time_s", time_s)?.unbind(),
+            theta1_rad: column("theta1_rad", theta1_rad)?.unbind(),
+            theta2_rad: column("theta2_rad", theta2_rad)?.unbind(),
+            load_nm: Condition::take("load_nm", load_nm)?,
+            speed_rpm: Condition::take("speed_rpm", speed_rpm)?,
+            direction: model::parse_direction(direction)?,
             input_lines: lines("input_lines", input_lines)?,
             output_lines: lines("output_lines", output_lines)?,
-        })
+        };
+        let read = this.read(py);
+        let columns = read.columns()?;
+        py.detach(|| model::Recording::new(columns).map(drop))?;
+        Ok(this)
     }
 
     /// Time of the samples, s, shape (n,).
@@ -280,19 +274,13 @@ impl Recording {
     /// Turns of the driver between the first and the last sample that are no gap, > 0.
     #[getter]
     fn revolutions(&self, py: Python<'_>) -> Result<f64> {
-        let theta1 = self.theta1_rad.bind(py).readonly();
-        let theta1 = theta1.as_slice().map_err(PyErr::from)?;
-        let mut seen = theta1.iter().filter(|theta| theta.is_finite());
-        let first = seen.next().copied().unwrap_or(0.0);
-        Ok((seen.next_back().copied().unwrap_or(first) - first).abs() / std::f64::consts::TAU)
+        Ok(self.read(py).recording()?.turns())
     }
 
     /// Time from the first to the last sample, s.
     #[getter]
     fn duration_s(&self, py: Python<'_>) -> Result<f64> {
-        let time = self.time_s.bind(py).readonly();
-        let time = time.as_slice().map_err(PyErr::from)?;
-        Ok(time.last().zip(time.first()).map_or(0.0, |(last, first)| last - first))
+        Ok(self.read(py).recording()?.duration_s())
     }
 
     /// The parts of one sense each, in order, as recordings with "ccw" or "cw"; views, no copies.
@@ -312,22 +300,21 @@ impl Recording {
             parts.append(slf)?;
             return Ok(parts);
         }
-        let theta1 = this.theta1_rad.bind(py).readonly();
-        let theta1 = theta1.as_slice().map_err(PyErr::from)?;
-        for stretch in py.detach(|| split::stretches(theta1)) {
+        let read = this.read(py);
+        let recording = read.recording()?;
+        for stretch in py.detach(|| recording.stretches()) {
             let samples = PySlice::new(py, stretch.from as isize, stretch.to as isize, 1);
             let part = |values: &Py<PyArray1<f64>>| -> Result<Py<PyArray1<f64>>> {
                 column("part", &values.bind(py).get_item(&samples)?).map(Bound::unbind)
             };
-            let length = stretch.to - stretch.from;
             parts.append(Bound::new(
                 py,
                 Self {
                     time_s: part(&this.time_s)?,
                     theta1_rad: part(&this.theta1_rad)?,
                     theta2_rad: part(&this.theta2_rad)?,
-                    load_nm: Condition::take("load_nm", &this.load_nm.part(py, &samples)?, length)?,
-                    speed_rpm: Condition::take("speed_rpm", &this.speed_rpm.part(py, &samples)?, length)?,
+                    load_nm: Condition::take("load_nm", &this.load_nm.part(py, &samples)?)?,
+                    speed_rpm: Condition::take("speed_rpm", &this.speed_rpm.part(py, &samples)?)?,
                     direction: Some(stretch.direction),
                     input_lines: this.input_lines,
                     output_lines: this.output_lines,
@@ -344,18 +331,20 @@ impl Recording {
 
     /// A summary in one line.
     fn __repr__(&self, py: Python<'_>) -> Result<String> {
-        let condition = |condition: &Condition| match condition {
-            Condition::All(value) => Ok(format!("{value:?}")),
-            Condition::Each(_) => condition.mean(py).map(|mean| format!("array(mean {mean:.4})")),
+        let read = self.read(py);
+        let recording = read.recording()?;
+        let condition = |condition: &model::Condition<'_>| match condition {
+            model::Condition::All(value) => format!("{value:?}"),
+            model::Condition::Each(_) => format!("array(mean {:.4})", condition.mean()),
         };
         Ok(format!(
             "Recording({} samples, {} s, {:.3} turns, direction='{}', load_nm={}, speed_rpm={})",
-            self.__len__(py),
-            (self.duration_s(py)? * 1e3).round() / 1e3,
-            self.revolutions(py)?,
+            recording.samples(),
+            (recording.duration_s() * 1e3).round() / 1e3,
+            recording.turns(),
             self.direction(),
-            condition(&self.load_nm)?,
-            condition(&self.speed_rpm)?,
+            condition(&recording.columns().load_nm),
+            condition(&recording.columns().speed_rpm),
         ))
     }
 

@@ -1,12 +1,12 @@
 //! Where a recording reverses: a robot joint's goes to and fro.
 
-use gearmodel::Direction;
+use crate::Direction;
 
 /// Way back that makes a reversal, rad: above encoder noise and velocity ripple, below any motion that is meant.
 pub const REVERSAL_RAD: f64 = 0.01;
 
 /// A stretch of one sense: samples `from..to`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stretch {
     /// First sample.
     pub from: usize,
@@ -23,6 +23,7 @@ type Extremum = Option<(usize, f64)>;
 ///
 /// A turning point is an extremum from which the angle then comes back by more than [`REVERSAL_RAD`]; the sample of the
 /// extremum begins the new stretch.
+#[must_use]
 pub fn stretches(theta1_rad: &[f64]) -> Vec<Stretch> {
     let mut found: Vec<Stretch> = Vec::new();
     let mut from = 0;
@@ -65,4 +66,37 @@ pub fn stretches(theta1_rad: &[f64]) -> Vec<Stretch> {
         found.push(Stretch { from, to: theta1_rad.len(), direction });
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn swing(samples: usize, noise_rad: f64) -> Vec<f64> {
+        // A sawtooth on top stands for encoder noise.
+        (0..samples).map(|i| (i as f64 * 0.01).sin() + noise_rad * f64::from(i as u32 % 2)).collect()
+    }
+
+    #[test]
+    fn noise_below_the_limit_makes_no_reversal_and_motion_above_it_does() {
+        let directions = |theta: &[f64]| stretches(theta).iter().map(|part| part.direction).collect::<Vec<_>>();
+        let there_and_back = [Direction::Ccw, Direction::Cw, Direction::Ccw];
+        assert_eq!(directions(&swing(629, 0.0)), there_and_back);
+        assert_eq!(directions(&swing(629, 0.9 * REVERSAL_RAD)), there_and_back);
+        assert!(directions(&swing(629, 1.5 * REVERSAL_RAD)).len() > 3);
+        assert!(stretches(&[0.0, 0.5 * REVERSAL_RAD, 0.0]).is_empty());
+    }
+
+    #[test]
+    fn stretches_cover_every_sample_once_and_meet_at_the_extrema() {
+        let mut theta = swing(1000, 0.0);
+        theta[300] = f64::NAN;
+        let parts = stretches(&theta);
+        assert_eq!((parts[0].from, parts[parts.len() - 1].to), (0, 1000));
+        assert!(parts.windows(2).all(|pair| pair[0].to == pair[1].from));
+        let expected = [157, 471, 785];
+        for (part, turn) in parts.iter().zip(expected) {
+            assert!(part.to.abs_diff(turn) <= 1, "{part:?} {turn}");
+        }
+    }
 }

@@ -1,18 +1,11 @@
 //! What a recording must be before anything is computed from it.
 
-use gearmodel::Direction;
+use crate::Direction;
 
-/// Why columns are no recording: the field, the place and the limit.
-#[derive(Debug, PartialEq, thiserror::Error)]
+/// Why columns are no recording, or no recording of one sense: the field, the place and the limit.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RecordingError {
-    /// A matrix or a single number where a column is needed.
-    #[error("{field} has {dimensions} dimensions: 1 is needed, a value a sample")]
-    Dimensions {
-        /// The column.
-        field: &'static str,
-        /// Its dimensions.
-        dimensions: usize,
-    },
     /// Columns of different lengths.
     #[error("{field} has {length} values, time_s has {needed}: all columns need one value a sample")]
     Length {
@@ -89,7 +82,7 @@ pub enum RecordingError {
         direction: Direction,
     },
     /// An encoder needs lines.
-    #[error("{field} is {value}: a whole number of at least 1 is needed, or None where it is not known")]
+    #[error("{field} is {value}: a whole number of at least 1 is needed, or none where it is not known")]
     Lines {
         /// The argument.
         field: &'static str,
@@ -98,7 +91,7 @@ pub enum RecordingError {
     },
     /// The driver turns back where one sense is needed.
     #[error(
-        "the recording reverses {reversals} times, first near time_s[{index}]: analyse the parts of .split() one by one"
+        "the recording reverses {reversals} times, first near time_s[{index}]: analyse the parts of split() one by one"
     )]
     Reverses {
         /// How often.
@@ -118,7 +111,7 @@ pub enum RecordingError {
 const CLEAR_TRAVEL_RAD: f64 = 0.1;
 
 /// Passes times that are finite and increase.
-pub fn check_time(time_s: &[f64]) -> Result<(), RecordingError> {
+pub(super) fn check_time(time_s: &[f64]) -> Result<(), RecordingError> {
     if time_s.is_empty() {
         return Err(RecordingError::Empty);
     }
@@ -136,7 +129,12 @@ pub fn check_time(time_s: &[f64]) -> Result<(), RecordingError> {
 }
 
 /// Passes a column that is as long as the time and never infinite; NaN is a gap where `gaps` allows it.
-pub fn check_column(field: &'static str, values: &[f64], needed: usize, gaps: bool) -> Result<(), RecordingError> {
+pub(super) fn check_column(
+    field: &'static str,
+    values: &[f64],
+    needed: usize,
+    gaps: bool,
+) -> Result<(), RecordingError> {
     if values.len() != needed {
         return Err(RecordingError::Length { field, length: values.len(), needed });
     }
@@ -153,7 +151,7 @@ pub fn check_column(field: &'static str, values: &[f64], needed: usize, gaps: bo
 }
 
 /// Passes an angle that moves in the stated sense, or hardly at all.
-pub fn check_sense(field: &'static str, values: &[f64], direction: Direction) -> Result<(), RecordingError> {
+pub(super) fn check_sense(field: &'static str, values: &[f64], direction: Direction) -> Result<(), RecordingError> {
     let mut seen = values.iter().copied().filter(|value| value.is_finite());
     let (Some(first), Some(last)) = (seen.next(), values.iter().rfind(|value| value.is_finite())) else {
         return Ok(());
@@ -163,4 +161,9 @@ pub fn check_sense(field: &'static str, values: &[f64], direction: Direction) ->
         return Err(RecordingError::Sense { field, travel_rad, direction });
     }
     Ok(())
+}
+
+/// Passes an encoder's lines.
+pub(super) fn check_lines(field: &'static str, lines: Option<u64>) -> Result<(), RecordingError> {
+    if lines == Some(0) { Err(RecordingError::Lines { field, value: 0 }) } else { Ok(()) }
 }
