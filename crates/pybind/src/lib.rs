@@ -10,6 +10,7 @@
 mod analysis;
 mod array;
 mod backlash;
+mod diagnosis;
 mod error;
 mod errors;
 mod log;
@@ -28,6 +29,8 @@ mod _native {
     use crate::analysis::{Analysis, analyse};
     #[pymodule_export]
     use crate::backlash::{MeasuredBacklash, backlash_from};
+    #[pymodule_export]
+    use crate::diagnosis::{NativeDiagnosis, diagnose};
     #[pymodule_export]
     use crate::error::{GeometryError, LogError};
     #[pymodule_export]

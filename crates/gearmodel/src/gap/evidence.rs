@@ -12,6 +12,9 @@ use super::pool::{Block, Pool};
 /// Scales of a candidate, rad: 1 µrad to 1 mrad.
 const SCALES: usize = 11;
 const SMALLEST_SCALE_RAD: f64 = 1e-6;
+/// Blocks wider than this are scanned on a coarser grid of scales: 2, 8, 32, 128 µrad.
+const WIDE: usize = 16;
+const WIDE_SCALES: i32 = 4;
 /// What the freedom of a scale costs: as on the grid, a third of whose points fit.
 const SCALE_COST: f64 = 1.3;
 /// Prior standard deviation of the zero, rad.
@@ -139,6 +142,15 @@ pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -
     })
 }
 
+/// Log evidence of a fit's set at its scales under another noise, whose matrix holds the residual and the fit's columns only.
+#[must_use]
+pub(super) fn at_scales(pool: &Pool, whitened: &Whitened, fit: &Fit) -> f64 {
+    let columns: Vec<usize> = (1..=fit.columns.len()).collect();
+    let (g, b) = select(&whitened.gram, &columns);
+    let evidence = solve(&g, &b, &prior(&pool.blocks, &fit.set, &fit.scales_rad)).map_or(f64::NEG_INFINITY, |s| s.log_evidence);
+    evidence - 0.5 * whitened.log_det - 0.5 * whitened.gram[(RESIDUAL, RESIDUAL)]
+}
+
 fn one_sided(block: &Block) -> bool {
     matches!(block.cause, super::pool::Cause::Effect { effect, .. } if effect.one_sided()) && block.width() == 1
 }
@@ -190,8 +202,23 @@ pub fn scan(pool: &Pool, whitened: &Whitened, fit: &Fit, candidates: &[usize]) -
         .collect()
 }
 
+/// [`gain`] of a wide block on a coarser grid of scales: a factorisation each is cheaper than one eigendecomposition.
+fn gain_of_wide(schur: &DMatrix<f64>, rhs: &DVector<f64>, d: usize) -> f64 {
+    let logs: Vec<f64> = (0..WIDE_SCALES)
+        .map(|n| {
+            let scale = 2.0 * SMALLEST_SCALE_RAD * 4.0_f64.powi(n);
+            solve(schur, rhs, &vec![scale * scale / d as f64; d]).map_or(f64::NEG_INFINITY, |s| s.log_evidence)
+        })
+        .collect();
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    most - f64::from(WIDE_SCALES).ln()
+}
+
 /// Log evidence gained by a block with Schur complement `schur` and right side `rhs`, mean over the scales.
 fn gain(schur: &DMatrix<f64>, rhs: &DVector<f64>, d: usize, one_sided: bool) -> f64 {
+    if d > WIDE {
+        return gain_of_wide(schur, rhs, d);
+    }
     let (values, projected): (Vec<f64>, Vec<f64>) = if d == 1 {
         (vec![schur[(0, 0)]], vec![rhs[0]])
     } else {

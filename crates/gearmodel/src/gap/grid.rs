@@ -41,6 +41,8 @@ pub struct Grid {
     pub cell_of: Vec<usize>,
     /// Station of every cell.
     pub cells: Vec<Station>,
+    /// Part of its revolution at which every cell stands, 0 to 1.
+    pub part_of_cell: Vec<f64>,
     /// Residual at every place, rad.
     pub rho_rad: Vec<f64>,
     /// Samples at every place.
@@ -103,6 +105,7 @@ impl Grid {
             places: Vec::new(),
             cell_of: Vec::new(),
             cells: Vec::new(),
+            part_of_cell: Vec::new(),
             rho_rad: Vec::new(),
             weight: Vec::new(),
             place_of_point: vec![Vec::new(); runs.len()],
@@ -135,7 +138,7 @@ impl Grid {
     fn add_run(&mut self, rig: &Rig, run: &ReducedRun, number: usize, frame: &RunFrame, ledger: &mut Ledger) {
         let index = self.directions.len();
         self.directions.push(run.direction);
-        let (sense, bins) = (run.direction.sign(), self.bins);
+        let bins = self.bins;
         let revolutions = frame.turns.div_ceil(frame.merge).max(1);
         let mut sums = vec![Sum::default(); revolutions * bins];
         let origin_rad = run.points[0].theta1_rad;
@@ -150,8 +153,11 @@ impl Grid {
             let slot = nearest(&ledger.load_nm, point.load_nm);
             ledger.signed_rev[slot] += step_rev;
             ledger.way_rev[slot] += step_rev.abs();
-            let turn = (((point.theta1_rad - origin_rad).abs() / TAU) as usize).min(frame.turns - 1) / frame.merge;
-            let bin = (((point.theta1_rad / TAU).rem_euclid(1.0) * bins as f64) as usize).min(bins - 1);
+            // Bins count from where the run begins, so that none holds both ends of a revolution.
+            let way_rev = (point.theta1_rad - origin_rad).abs() / TAU;
+            let turn = (way_rev as usize).min(frame.turns - 1);
+            let bin = (((way_rev - turn as f64).clamp(0.0, 1.0) * bins as f64) as usize).min(bins - 1);
+            let turn = turn / frame.merge;
             let key = turn * bins + bin;
             keys.push(key);
             let w = point.samples;
@@ -199,6 +205,7 @@ impl Grid {
                 if !steady || cell_of_bin[bin] == usize::MAX {
                     cell_of_bin[bin] = self.cells.len();
                     self.cells.push(station);
+                    self.part_of_cell.push((bin as f64 + 0.5) / bins as f64);
                 }
                 place_of_key[key] = self.places.len();
                 self.places.push(station);
@@ -214,7 +221,6 @@ impl Grid {
             }
         }
         self.place_of_point[number] = keys.into_iter().map(|key| place_of_key[key]).collect();
-        debug_assert!(sense != 0.0);
     }
 }
 

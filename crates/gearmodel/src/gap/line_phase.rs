@@ -42,10 +42,11 @@ impl LinePhase {
         }
     }
 
-    /// Takes a sample: residual with any slow part, and the ratio through which the input encoder is seen.
-    pub(super) fn push(&mut self, theta1_rad: f64, theta2_rad: f64, ratio: f64, rho_rad: f64) {
+    /// Takes a sample: residual with any slow part, and the ratio through which the input encoder is seen. Returns the waves
+    /// there.
+    pub(super) fn push(&mut self, theta1_rad: f64, theta2_rad: f64, ratio: f64, rho_rad: f64) -> [f64; WAVES] {
         if self.lines == [None, None] {
-            return;
+            return [0.0; WAVES];
         }
         if self.block.is_empty() {
             self.origin = [theta1_rad, theta2_rad];
@@ -69,6 +70,7 @@ impl LinePhase {
         if self.block.len() >= BLOCK_SAMPLES && periods(0).min(periods(1)) >= BLOCK_LINES {
             self.flush();
         }
+        x
     }
 
     /// Books the block.
@@ -123,13 +125,35 @@ impl LinePhase {
         let statistic = explained / variance;
         // Unit-information prior on two amplitudes.
         let log_bayes_factor = 0.5 * statistic - (1.0 + self.freedom).ln();
-        Some(LineError { amplitudes: [beta[0], beta[1]], covariance: inverse * variance, log_bayes_factor })
+        Some(LineError {
+            encoder,
+            order,
+            amplitudes: [beta[0], beta[1]],
+            covariance: inverse * variance,
+            log_bayes_factor,
+            explained_rad2: explained,
+        })
+    }
+}
+
+impl LineError {
+    /// TE of the error for mean line waves.
+    #[must_use]
+    pub fn te_rad(&self, lines: &[f64; WAVES]) -> f64 {
+        let first = 4 * self.encoder + 2 * (self.order - 1);
+        lines[first] * self.amplitudes[0] + lines[first + 1] * self.amplitudes[1]
     }
 }
 
 /// A sub-divisional error found.
 #[derive(Clone, Copy, Debug)]
 pub struct LineError {
+    /// Encoder, 0 input, 1 output.
+    pub encoder: usize,
+    /// Order of the line period.
+    pub order: usize,
+    /// Sum of squares of the samples that it explains, rad².
+    pub explained_rad2: f64,
     /// Amplitudes of sin(hLθ) and cos(hLθ) of the reading error, rad.
     pub amplitudes: [f64; 2],
     /// Their covariance.

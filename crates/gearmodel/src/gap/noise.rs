@@ -1,7 +1,8 @@
 //! Repeatability: what differs between revolutions and runs of one condition.
 //!
 //! Residual of a place = model + run's waves + revolution's waves + white noise. The waves are the low orders of the driver's
-//! turn, 0 … [`ORDERS`]; wave n has variance λ_n between revolutions and κ λ_n between runs, white noise σ²/samples. With
+//! turn, 0 … [`ORDERS`], and what goes from one level to the next within a revolution: a ramp, alone and on order 1. Wave n has
+//! variance λ_n between revolutions and κ λ_n between runs (κ of the level its own), white noise σ²/samples. With
 //! Z the waves at the places, V = σ²W⁻¹ + Z Λ Zᵀ (+ the same across a run), inverted by Woodbury's identity on the sums
 //! of the pool. Samples are not independent: treated as such, a null campaign shows false effects more often than not.
 
@@ -12,36 +13,61 @@ use super::pool::Pool;
 
 /// Highest order of the driver's turn that scatters.
 pub(super) const ORDERS: usize = 8;
-/// Waves: the constant, and cosine and sine of every order.
-pub(super) const WAVES: usize = 2 * ORDERS + 1;
+/// Ramps: alone, and on cosine and sine of order 1.
+const RAMPS: usize = 3;
+/// Waves: the constant, cosine and sine of every order, and the ramps.
+pub(super) const WAVES: usize = 2 * ORDERS + 1 + RAMPS;
+/// Kinds of waves: order 0 … [`ORDERS`], the ramp, the ramp on order 1.
+pub(super) const KINDS: usize = ORDERS + 3;
 /// Least scatter taken of an order, rad: a hundredth of the finest rig's.
 const LEAST_SCATTER_RAD: f64 = 3e-8;
+/// Variance of a ramp in parts of that of what it goes with.
+const RAMP: f64 = 0.2;
+/// Waves that are no ramps.
+const STEADY: usize = 2 * ORDERS + 1;
 /// Coverage from which a revolution's waves are well determined.
 const FULL: f64 = 0.9;
 
-/// Waves of unit RMS at an angle.
-pub(super) fn waves(theta1_rad: f64) -> [f64; WAVES] {
+/// Waves of unit RMS at an angle and a part of the revolution, 0 to 1.
+pub(super) fn waves(theta1_rad: f64, part: f64) -> [f64; WAVES] {
     let mut z = [1.0; WAVES];
+    let ramp = 2.0 * 3.0_f64.sqrt() * (part - 0.5);
     for order in 1..=ORDERS {
         let (sin, cos) = (order as f64 * theta1_rad).sin_cos();
         z[2 * order - 1] = std::f64::consts::SQRT_2 * cos;
         z[2 * order] = std::f64::consts::SQRT_2 * sin;
     }
+    let first = 2 * ORDERS + 1;
+    z[first] = ramp;
+    z[first + 1] = ramp * z[1];
+    z[first + 2] = ramp * z[2];
     z
 }
 
-/// Order of a wave.
-fn order(wave: usize) -> usize {
-    wave.div_ceil(2)
+/// Kind of a wave.
+pub(super) fn kind(wave: usize) -> usize {
+    match wave.checked_sub(2 * ORDERS + 1) {
+        None => wave.div_ceil(2),
+        Some(0) => ORDERS + 1,
+        Some(_) => ORDERS + 2,
+    }
 }
+
+/// Waves of a kind.
+fn members(kind: usize) -> f64 {
+    if kind == 0 || kind == ORDERS + 1 { 1.0 } else { 2.0 }
+}
+
+/// Scatter between runs over that between revolutions before anything is known: of the level, and of the other waves.
+pub(super) const FIRST_RUN_RATIO: [f64; 2] = [1.0, 0.3];
 
 /// Variances of the noise.
 #[derive(Clone, Debug)]
 pub struct Noise {
     /// White, a sample, rad².
     pub white_rad2: f64,
-    /// Between revolutions, by order, rad² of each wave.
-    pub order_rad2: [f64; ORDERS + 1],
+    /// Between revolutions, by kind of wave, rad² of each wave.
+    pub order_rad2: [f64; KINDS],
     /// Between runs, in parts of that between revolutions; of order 0 and of the others.
     pub run_ratio: [f64; 2],
     /// Independent differences from which the revolutions' scatter was estimated; 0 where it was assumed.
@@ -78,7 +104,9 @@ impl Noise {
             .zip(&pool.wave_products)
             .zip(&residual_waves)
             .map(|((revolution, k), e)| {
-                (revolution.coverage >= FULL).then(|| Cholesky::new(k.clone()).map(|c| c.solve(e))).flatten()
+                // Without the ramps: over a whole turn they are nearly sums of the orders.
+                let (k, e) = (k.view((0, 0), (STEADY, STEADY)).into_owned(), e.rows(0, STEADY).into_owned());
+                (revolution.coverage >= FULL).then(|| Cholesky::new(k).map(|c| c.solve(&e))).flatten()
             })
             .collect();
         let trace = pool.trace(grid, amplitudes);
@@ -86,6 +114,7 @@ impl Noise {
         let (white_rad2, weight) = white(grid, &fitted, &rest);
         // Squared differences between neighbouring revolutions, by order.
         let mut squares: Vec<Vec<f64>> = vec![Vec::new(); ORDERS + 1];
+        let of_white = white_rad2 / weight.max(1.0);
         for run in 0..grid.directions.len() {
             let numbers: Vec<usize> =
                 (0..grid.revolutions.len()).filter(|n| grid.revolutions[*n].run == run && fitted[*n].is_some()).collect();
@@ -102,13 +131,12 @@ impl Noise {
             let shrink = if differences.len() >= 3 { 1.0 - 1.0 / differences.len() as f64 } else { 1.0 };
             for difference in &differences {
                 squares[0].push((difference[0] - mean).powi(2) / shrink);
-                for wave in 1..WAVES {
-                    squares[order(wave)].push(difference[wave].powi(2));
+                for wave in 1..STEADY {
+                    squares[kind(wave)].push(difference[wave].powi(2));
                 }
             }
         }
-        let of_white = white_rad2 / weight.max(1.0);
-        let mut order_rad2 = [0.0; ORDERS + 1];
+        let mut order_rad2 = [0.0; KINDS];
         for (variance, squares) in order_rad2.iter_mut().zip(&mut squares) {
             *variance = scatter(squares, of_white);
         }
@@ -117,14 +145,17 @@ impl Noise {
             // One revolution a run: nothing says how well it repeats. As much scatter as white noise in a tenth of a turn.
             order_rad2 = std::array::from_fn(|n| 10.0 * of_white / (1.0 + n as f64));
         }
-        Self { white_rad2, order_rad2, run_ratio: [0.3; 2], freedom }
+        // A level that changes from turn to turn changes within them too.
+        order_rad2[ORDERS + 1] = RAMP * order_rad2[0];
+        order_rad2[ORDERS + 2] = RAMP * order_rad2[1];
+        Self { white_rad2, order_rad2, run_ratio: FIRST_RUN_RATIO, freedom }
     }
 
     /// RMS of what does not repeat, as a sample shows it, rad.
     #[must_use]
     pub fn floor_rad2(&self) -> f64 {
         let between = |n: usize| self.order_rad2[n] * (1.0 + self.run_ratio[usize::from(n > 0)]);
-        between(0) + (1..=ORDERS).map(|n| 2.0 * between(n)).sum::<f64>()
+        (0..KINDS).map(|n| members(n) * between(n)).sum()
     }
 
     /// XᵀV⁻¹X and log det V.
@@ -141,7 +172,7 @@ impl Noise {
         let p = columns.len();
         let precision = 1.0 / self.white_rad2;
         let lambda: Vec<f64> =
-            (0..WAVES).map(|w| self.order_rad2[order(w)].max(LEAST_SCATTER_RAD * LEAST_SCATTER_RAD)).collect();
+            (0..WAVES).map(|w| self.order_rad2[kind(w)].max(LEAST_SCATTER_RAD * LEAST_SCATTER_RAD)).collect();
         let mut gram = if only.is_none() {
             &pool.products * precision
         } else {
@@ -202,7 +233,7 @@ fn white(grid: &Grid, fitted: &[Option<nalgebra::DVector<f64>>], rest: &[f64]) -
     let mut count = 0.0;
     let closes = grid.cells.len() < grid.places.len();
     let deviation = |number: usize, place: usize| {
-        let z = waves(grid.places[place].theta1_rad);
+        let z = waves(grid.places[place].theta1_rad, grid.part_of_cell[grid.cell_of[place]]);
         let low: f64 = fitted[number].as_ref().map_or(0.0, |u| z.iter().zip(u.iter()).map(|(z, u)| z * u).sum());
         rest[place] - low
     };

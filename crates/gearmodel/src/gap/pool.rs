@@ -23,8 +23,8 @@ pub enum Cause {
         number: usize,
         /// Shape.
         shape: Shape,
-        /// Shapes that were open to choice.
-        choices: usize,
+        /// What the choice of the shape costs, nats.
+        cost_nats: f64,
     },
     /// A pattern that no effect of the library makes.
     Unknown(Pattern),
@@ -82,7 +82,12 @@ impl Pool {
         for (cell, weight) in grid.cell_of.iter().zip(&grid.weight) {
             cell_weight[*cell] += weight;
         }
-        let wave_values: Vec<[f64; WAVES]> = grid.cells.iter().map(|cell| super::noise::waves(cell.theta1_rad)).collect();
+        let wave_values: Vec<[f64; WAVES]> = grid
+            .cells
+            .iter()
+            .zip(&grid.part_of_cell)
+            .map(|(cell, part)| super::noise::waves(cell.theta1_rad, *part))
+            .collect();
         let wave_products = grid
             .revolutions
             .iter()

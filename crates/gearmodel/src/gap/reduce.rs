@@ -28,6 +28,8 @@ pub struct Point {
     pub load_nm: f64,
     /// Samples.
     pub samples: f64,
+    /// Mean of the encoders' line waves as TE shows them.
+    pub lines: [f64; super::line_phase::WAVES],
 }
 
 /// A run reduced to points.
@@ -117,7 +119,8 @@ impl<'a> Reducer<'a> {
         stretch.sum.load_nm += sample.load_nm;
         stretch.sum.samples += 1.0;
         stretch.squares += deviation * deviation;
-        self.lines.push(sample.theta1_rad, sample.theta2_rad, stretch.ratio, deviation);
+        let waves = self.lines.push(sample.theta1_rad, sample.theta2_rad, stretch.ratio, deviation);
+        stretch.sum.lines.iter_mut().zip(waves).for_each(|(sum, x)| *sum += x);
     }
 
     fn close(&mut self) {
@@ -133,6 +136,7 @@ impl<'a> Reducer<'a> {
             rho_rad: mean - self.nominal.te_rad(theta1_rad, self.run.direction, load_nm),
             load_nm,
             samples: n,
+            lines: sum.lines.map(|x| x / n),
         });
         self.run.within_rad2 += (squares - n * mean * mean).max(0.0);
         self.run.samples += n;

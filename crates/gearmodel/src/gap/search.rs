@@ -10,10 +10,14 @@ use super::pool::{Cause, Pool};
 const EFFECT_ODDS: f64 = 0.04;
 /// Prior odds that any pattern outside the library is there, shared by all of them.
 const UNKNOWN_ODDS: f64 = 0.15;
+/// Prior of an effect that is known to be there, nats.
+const KNOWN_NATS: f64 = 1e4;
 /// Most blocks of a set.
 const LARGEST_SET: usize = 8;
 /// How many of the best candidates are tried exactly.
 const TRIED: usize = 5;
+/// Candidates kept of a scan.
+const MOST_RANKED: usize = 60;
 /// Starts beside the empty set.
 const STARTS: usize = 4;
 
@@ -34,23 +38,26 @@ pub struct Search<'a> {
     offset: f64,
     priors: Vec<f64>,
     seen: HashMap<Vec<usize>, Option<Model>>,
+    scanned: HashMap<(Vec<usize>, bool), Vec<(usize, f64)>>,
 }
 
 impl<'a> Search<'a> {
     /// A search in a pool under one noise.
     #[must_use]
-    pub fn new(pool: &'a Pool, whitened: &'a Whitened) -> Self {
+    pub fn new(pool: &'a Pool, whitened: &'a Whitened, known: &[String]) -> Self {
         let unknowns = pool.blocks.iter().filter(|b| matches!(b.cause, Cause::Unknown(_))).count().max(1) as f64;
         let priors = pool
             .blocks
             .iter()
             .map(|block| match &block.cause {
-                Cause::Effect { choices, .. } => EFFECT_ODDS.ln() - (*choices as f64).powf(0.8).ln(),
+                // What is known to be there needs no evidence.
+                Cause::Effect { effect, .. } if known.iter().any(|name| name == effect.name()) => KNOWN_NATS,
+                Cause::Effect { cost_nats, .. } => EFFECT_ODDS.ln() - cost_nats,
                 Cause::Unknown(_) => UNKNOWN_ODDS.ln() - unknowns.ln(),
             })
             .collect();
         let offset = -0.5 * whitened.log_det - 0.5 * whitened.gram[(0, 0)];
-        Self { pool, whitened, offset, priors, seen: HashMap::new() }
+        Self { pool, whitened, offset, priors, seen: HashMap::new(), scanned: HashMap::new() }
     }
 
     fn library(&self, block: usize) -> Option<usize> {
@@ -92,14 +99,20 @@ impl<'a> Search<'a> {
     }
 
     /// The best additions to a model: (block, score by the scan).
-    fn additions(&self, model: &Model, unknown: bool, count: usize) -> Vec<(usize, f64)> {
+    fn additions(&mut self, model: &Model, unknown: bool, count: usize) -> Vec<(usize, f64)> {
+        let key = (model.fit.set.clone(), unknown);
+        if let Some(known) = self.scanned.get(&key) {
+            return known[..count.min(known.len())].to_vec();
+        }
         let candidates = self.open(&model.fit.set, unknown);
         let gains = scan(self.pool, self.whitened, &model.fit, &candidates);
         let mut ranked: Vec<(usize, f64)> =
             candidates.iter().zip(gains).map(|(b, gain)| (*b, model.score + gain + self.priors[*b])).collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
-        ranked.truncate(count);
-        ranked
+        ranked.truncate(MOST_RANKED);
+        let best = ranked[..count.min(ranked.len())].to_vec();
+        self.scanned.insert(key, ranked);
+        best
     }
 
     /// Climbs from a set to where no addition, removal or swap raises the posterior.

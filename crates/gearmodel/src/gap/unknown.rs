@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::effect::{Plan, Shaft, Station};
+use crate::effect::{Accumulates, Carrier, Parity, Plan, Shaft, Signature, Station};
 
 /// How a pattern scales with the condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -193,6 +193,61 @@ impl Pattern {
                 let place = (at.theta1_rad / TAU).rem_euclid(1.0) * *count as f64;
                 row[(place as usize).min(count - 1)] = scale(*weight, *mean, *odd);
             }
+        }
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let shaft_name = |shaft: &Shaft| if *shaft == Shaft::Input { "driver" } else { "driven shaft" };
+        let scaled = |odd: bool, weight: Weight| {
+            let size = match weight {
+                Weight::One => "at any load and speed",
+                Weight::Load => "growing with the load",
+                Weight::Speed => "growing with the speed",
+                Weight::Time => "changing with time",
+            };
+            format!("{}, {size}", if odd { "opposite in the two senses" } else { "alike in both senses" })
+        };
+        match self {
+            Self::Order { shaft, order, odd, weight, .. } => {
+                format!("order {order} of the {}, {}", shaft_name(shaft), scaled(*odd, *weight))
+            }
+            Self::OneSense { shaft, order, sense } => {
+                let sense = if *sense > 0.0 { "ccw" } else { "cw" };
+                format!("order {order} of the {} when driving {sense} only", shaft_name(shaft))
+            }
+            Self::Level { odd, weight, .. } => format!("an offset, {}", scaled(*odd, *weight)),
+            Self::RunLevels { .. } => "an offset that differs from run to run".to_owned(),
+            Self::Tone { frequency_hz } => format!("a tone of {frequency_hz:.4} Hz in time"),
+            Self::Step { time_s } => format!("a step at {time_s:.2} s"),
+            Self::Bumps { count, odd, weight, .. } => {
+                format!("a shape over the driver's turn ({count} sectors), {}", scaled(*odd, *weight))
+            }
+        }
+    }
+
+    /// Its signature row.
+    #[must_use]
+    pub fn signature(&self) -> Signature {
+        let carrier_of = |shaft: &Shaft| if *shaft == Shaft::Input { Carrier::Input } else { Carrier::Output };
+        let parity_of = |odd: bool| if odd { Parity::Odd } else { Parity::Even };
+        let scaled = |carrier, odd, weight| {
+            let steady = Signature::steady(carrier, parity_of(odd));
+            match weight {
+                Weight::One => steady,
+                Weight::Load => steady.with_load(1.0),
+                Weight::Speed => steady.with_speed(Some(1.0)),
+                Weight::Time => steady.accumulating(Accumulates::PerTime),
+            }
+        };
+        match self {
+            Self::Order { shaft, odd, weight, .. } => scaled(carrier_of(shaft), *odd, *weight),
+            Self::OneSense { shaft, .. } => Signature::steady(carrier_of(shaft), Parity::OneFlank),
+            Self::Level { odd, weight, .. } => scaled(Carrier::None, *odd, *weight),
+            Self::RunLevels { .. } | Self::Step { .. } => Signature::steady(Carrier::None, Parity::Mixed),
+            Self::Tone { .. } => Signature::steady(Carrier::Time, Parity::Mixed),
+            Self::Bumps { odd, weight, .. } => scaled(Carrier::Input, *odd, *weight),
         }
     }
 }

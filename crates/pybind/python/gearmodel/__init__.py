@@ -12,6 +12,7 @@ TE_cw - TE_ccw at equal theta1.
 """
 
 from ._analysis import Floor, OrderSpectrum, Spectra, SynchronousAverage, Waves, WaveSplit
+from ._diagnosis import CalibratedModel, Diagnosis, diagnose
 from ._native import (
     Analysis,
     Errors,
@@ -38,6 +39,8 @@ from ._study import SweepTable, Tolerance, ToleranceFigure
 
 __all__ = [
     "Analysis",
+    "CalibratedModel",
+    "Diagnosis",
     "Errors",
     "Event",
     "Floor",
@@ -64,6 +67,7 @@ __all__ = [
     "Waves",
     "analyse",
     "backlash_from",
+    "diagnose",
     "read_log",
     "sweep",
 ]

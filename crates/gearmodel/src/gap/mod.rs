@@ -1,0 +1,42 @@
+//! The gap between model and rig: where it lies, which effect causes it, how far it shrinks once that effect is added.
+//!
+//! | step | file | what comes out |
+//! |---|---|---|
+//! | residual against the nominal model, by stretches | `nominal`, `reduce`, `line_phase` | points, independent of the log's length |
+//! | revolutions × angle bins | `grid` | residual and station of every place |
+//! | columns of all effects and unknown patterns | `pool`, `unknown` | sums from which every fit is made |
+//! | what does not repeat | `noise` | covariance by order, revolution and run |
+//! | how probable is a set of effects | `evidence`, `search` | models with their posterior |
+//! | tones, steps | `events` | what angle does not carry |
+//! | probabilities, groups | `attribute` | verdict |
+//! | the gap on runs not used for the fit | `shrink` | how far it closes |
+//! | where | `locate` | tables and signature |
+//! | what to do next | `next` | experiments |
+//!
+//! Theory and measured figures: `docs/theory/diagnosis.md`.
+
+pub mod attribute;
+pub mod diagnosis;
+pub mod evidence;
+pub mod grid;
+pub mod html;
+pub mod line_phase;
+mod nominal;
+pub mod noise;
+pub mod pool;
+pub mod predict;
+pub mod reduce;
+pub mod search;
+pub mod summary;
+pub mod unknown;
+
+mod engine;
+mod events;
+mod interpolation;
+mod locate;
+mod next;
+mod shrink;
+
+pub use diagnosis::Diagnosis;
+pub use engine::{GapError, Options, diagnose, diagnose_runs, diagnose_with_nominal};
+pub use nominal::Nominal;

@@ -1,0 +1,513 @@
+//! From the models seen to the fields of the diagnosis.
+
+use serde_json::{Map, Value as Json, json};
+
+use super::*;
+use crate::effect::{Parameter, Value};
+use crate::gap::line_phase::LineError;
+use crate::gap::shrink::{HeldOut, Selection};
+
+/// Flattens what the noise model's own error makes too sure; calibrated on simulated campaigns.
+const SHARPNESS: f64 = 0.85;
+/// Prior odds of a sub-divisional error.
+const LINE_ODDS: f64 = 0.04;
+/// A remainder under this part of what was found is the found effects' own inexactness.
+const INEXACT: f64 = 0.04;
+
+/// What is known of one effect.
+struct Finding {
+    number: usize,
+    probability: f64,
+    block: Option<usize>,
+    estimate: Option<Estimate>,
+    shape: crate::effect::Shape,
+    rms_rad: f64,
+    shrink: Option<f64>,
+    twins: Vec<(usize, f64)>,
+}
+
+impl Engine<'_> {
+    pub(super) fn report(&self, lines: &[LineError]) -> Option<Diagnosis> {
+        let attribution = attribute::attribute(&self.pool, &self.models, SHARPNESS);
+        let best = self.models.first()?;
+        let mut search = Search::new(&self.pool, &self.whitened, &self.options.known);
+        let mut findings = self.findings(&attribution, best, &mut search, lines);
+
+        // Held-out shrink: of the best model, and of each effect alone.
+        let mut columns: Vec<usize> = best.fit.columns.clone();
+        columns.extend(findings.iter().filter_map(|f| f.block).flat_map(|b| self.pool.blocks[b].columns.clone()));
+        columns.sort_unstable();
+        columns.dedup();
+        let held_out = HeldOut::new(&self.grid, &self.pool, &self.noise, &columns);
+        let floor_rad2 = held_out.floor_rad2(&self.grid, &self.noise);
+        let before = held_out.errors(&Selection::default());
+        let after = held_out.errors(&self.selection(best));
+        let found = !best.fit.set.is_empty() || !lines.is_empty();
+        let explained_rad2 = lines.iter().map(|l| l.explained_rad2).sum::<f64>() / self.grid.samples;
+        // What the place's own samples scatter, less what the lines explain of it.
+        let within_rad2 = self.grid.within_rad2 / self.grid.samples;
+        let mut gap = shrink::gap(&before, &after, floor_rad2, within_rad2, explained_rad2, found);
+        let reducible = before.mean() + explained_rad2 - floor_rad2;
+        for finding in &mut findings {
+            finding.shrink = match finding.block {
+                Some(block) if reducible > 0.0 => {
+                    let d = self.pool.blocks[block].width() as f64;
+                    let scale = finding.rms_rad.max(1e-6);
+                    let alone = held_out.errors(&Selection {
+                        columns: self.pool.blocks[block].columns.clone().collect(),
+                        prior_rad2: vec![scale * scale / d; d as usize],
+                    });
+                    Some((before.mean() - alone.mean()) / reducible)
+                }
+                None if finding.probability > NAMED && reducible > 0.0 => Some(explained_rad2 / reducible),
+                _ => None,
+            };
+        }
+        findings.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.number.cmp(&b.number)));
+
+        let (groups, verdict) = self.verdict(&findings, &attribution, best);
+        let unknown = self.unknown(&attribution, best);
+        let mut verdict = verdict;
+        if unknown.probability > NAMED {
+            verdict.push(Verdict::Name("unknown".to_owned()));
+        }
+        gap.budget = self.budget(best, lines, reducible);
+        let found = self.found(&findings, &verdict);
+        let location = locate::locate(&locate::Inputs {
+            rig: self.rig,
+            grid: &self.grid,
+            pool: &self.pool,
+            noise: &self.noise,
+            best: &best.fit,
+            lines,
+            leading: found.effects.first(),
+        });
+        let confusability = self.confusability(&findings, best);
+        let mut warnings = locate::warnings(&self.grid, &self.noise);
+        warnings.extend(self.mimics(&findings, &verdict));
+        let next = next::experiments(&self.grid, &findings_for_next(&findings, &groups), &unknown, &warnings);
+        let curves = locate::curves(&self.grid, &self.pool, &best.fit);
+        Some(Diagnosis {
+            gap,
+            location,
+            effects: findings.iter().map(|f| self.finding(f)).collect(),
+            groups,
+            unknown,
+            verdict,
+            next,
+            warnings,
+            confusability,
+            found,
+            curves,
+        })
+    }
+
+    fn selection(&self, model: &Model) -> Selection {
+        let mut prior_rad2 = Vec::new();
+        for (block, scale) in model.fit.set.iter().zip(&model.fit.scales_rad) {
+            let d = self.pool.blocks[*block].width();
+            prior_rad2.extend(std::iter::repeat_n(scale * scale / d as f64, d));
+        }
+        Selection { columns: model.fit.columns[1..].to_vec(), prior_rad2 }
+    }
+
+    /// Every effect with its best block, its amplitudes as if it were the one, and who cannot be told from it.
+    fn findings(
+        &self,
+        attribution: &Attribution,
+        best: &Model,
+        search: &mut Search<'_>,
+        lines: &[LineError],
+    ) -> Vec<Finding> {
+        let mut findings = Vec::new();
+        let empty = search.model(Vec::new(), None);
+        for (number, effect) in LIBRARY.iter().enumerate() {
+            let own: Vec<usize> = (0..self.pool.blocks.len())
+                .filter(|b| matches!(&self.pool.blocks[*b].cause, Cause::Effect { number: n, .. } if *n == number))
+                .collect();
+            if let Some(encoder) = ["encoder1_interpolation", "encoder2_interpolation"].iter().position(|n| *n == effect.name()) {
+                findings.push(self.line_finding(number, encoder, lines));
+                continue;
+            }
+            let block = attribution.block[number].or_else(|| {
+                // Never part of a good model: the shape that fits best alone.
+                let empty = empty.as_ref()?;
+                let gains = super::super::evidence::scan(&self.pool, &self.whitened, &empty.fit, &own);
+                own.iter().zip(gains).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(b, _)| *b)
+            });
+            let Some(block) = block else { continue };
+            let in_best = best.fit.set.contains(&block);
+            let score_with = |search: &mut Search<'_>, out: Option<usize>, b: usize| {
+                let mut set: Vec<usize> = best.fit.set.iter().copied().filter(|x| Some(*x) != out).collect();
+                set.push(b);
+                search.model(set, Some(&best.fit))
+            };
+            let twins = if attribution.probability[number] > 0.02 {
+                let reference = if in_best {
+                    Some(best.score)
+                } else {
+                    // Judged beside the block that it would replace.
+                    best.fit
+                        .set
+                        .iter()
+                        .find(|b| attribute::angle_deg(&self.pool, &self.whitened, **b, block) < attribute::SAME_DEG)
+                        .and_then(|b| score_with(search, Some(*b), block))
+                        .map(|m| m.score)
+                };
+                reference.map_or_else(Vec::new, |reference| {
+                    let cell = std::cell::RefCell::new(&mut *search);
+                    let replaced = if in_best {
+                        Some(block)
+                    } else {
+                        best.fit.set.iter().copied().find(|b| {
+                            attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG
+                        })
+                    };
+                    twins(
+                        &self.pool,
+                        &self.whitened,
+                        attribution,
+                        number,
+                        &|b| score_with(&mut cell.borrow_mut(), replaced, b).map(|m| m.score),
+                        reference.max(best.score - 3.0),
+                    )
+                })
+            } else {
+                Vec::new()
+            };
+            // Amplitudes: in the best model, in place of its twin there, or beside it.
+            let model = if in_best {
+                Some(best.clone())
+            } else {
+                let twin = best.fit.set.iter().copied().find(|b| match &self.pool.blocks[*b].cause {
+                    Cause::Effect { number: n, .. } => *n == number
+                        || attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG,
+                    Cause::Unknown(_) => false,
+                });
+                score_with(search, twin, block)
+            };
+            let estimate = model.as_ref().and_then(|m| {
+                let n = m.fit.set.iter().position(|b| *b == block)?;
+                let place = m.fit.place(&self.pool, n);
+                let rms: f64 = m.fit.mean.rows(place.start, place.len()).norm();
+                Some((self.raw(m, n), rms))
+            });
+            let shape = match &self.pool.blocks[block].cause {
+                Cause::Effect { shape, .. } => shape.clone(),
+                Cause::Unknown(_) => Vec::new(),
+            };
+            let rms_rad = estimate.as_ref().map_or(0.0, |(_, rms)| *rms);
+            findings.push(Finding {
+                number,
+                probability: attribution.probability[number].min(1.0),
+                block: Some(block),
+                estimate: estimate.map(|(e, _)| e),
+                shape,
+                rms_rad,
+                shrink: None,
+                twins,
+            });
+        }
+        findings
+    }
+
+    fn line_finding(&self, number: usize, encoder: usize, lines: &[LineError]) -> Finding {
+        let strongest = lines
+            .iter()
+            .filter(|l| l.encoder == encoder)
+            .max_by(|a, b| a.log_bayes_factor.total_cmp(&b.log_bayes_factor));
+        let odds = strongest.map_or(f64::NEG_INFINITY, |l| l.log_bayes_factor + LINE_ODDS.ln());
+        let rms_rad = lines
+            .iter()
+            .filter(|l| l.encoder == encoder)
+            .map(|l| l.explained_rad2 / self.grid.samples)
+            .sum::<f64>()
+            .max(0.0)
+            .sqrt();
+        Finding {
+            number,
+            probability: 1.0 / (1.0 + (-odds).exp()),
+            block: None,
+            estimate: strongest.map(|l| Estimate {
+                beta: l.amplitudes.to_vec(),
+                covariance: nalgebra::DMatrix::from_column_slice(2, 2, l.covariance.as_slice()),
+            }),
+            shape: strongest
+                .and_then(|l| Some(vec![l.order as f64, self.rig.lines[encoder]?]))
+                .unwrap_or_default(),
+            rms_rad,
+            shrink: None,
+            twins: Vec::new(),
+        }
+    }
+
+    fn finding(&self, finding: &Finding) -> EffectFinding {
+        let effect = LIBRARY[finding.number];
+        let parameters = finding
+            .estimate
+            .as_ref()
+            .map(|estimate| {
+                effect.parameters(self.rig, &finding.shape, estimate).iter().map(|p| (p.name.to_owned(), parameter(p))).collect()
+            })
+            .unwrap_or_else(Map::new);
+        EffectFinding {
+            name: effect.name().to_owned(),
+            probability: finding.probability,
+            parameters,
+            shrink: finding.shrink.filter(|s| s.is_finite()),
+            component: effect.component().to_owned(),
+            confused_with: finding.twins.iter().map(|(n, _)| LIBRARY[*n].name().to_owned()).collect(),
+            rms_rad: finding.rms_rad,
+        }
+    }
+
+    /// Groups and what is named.
+    fn verdict(&self, findings: &[Finding], attribution: &Attribution, best: &Model) -> (Vec<Group>, Vec<Verdict>) {
+        let mut groups = Vec::new();
+        let mut verdict = Vec::new();
+        let mut done: Vec<usize> = Vec::new();
+        for finding in findings {
+            // A member of a group that was named before, or one that could only stand in for it.
+            if done.contains(&finding.number) || finding.twins.iter().any(|(n, _)| done.contains(n)) {
+                continue;
+            }
+            let members: Vec<usize> =
+                std::iter::once(finding.number).chain(finding.twins.iter().map(|(n, _)| *n)).collect();
+            let probability = if finding.block.is_none() {
+                finding.probability
+            } else {
+                self.models
+                    .iter()
+                    .zip(&attribution.weights)
+                    .filter(|(m, _)| {
+                        m.fit.set.iter().any(|b| {
+                            matches!(&self.pool.blocks[*b].cause, Cause::Effect { number, .. } if members.contains(number))
+                        })
+                    })
+                    .map(|(_, w)| w)
+                    .sum::<f64>()
+                    .min(1.0)
+            };
+            let in_best = finding.block.is_none()
+                || best.fit.set.iter().any(|b| {
+                    matches!(&self.pool.blocks[*b].cause, Cause::Effect { number, .. } if members.contains(number))
+                });
+            if members.len() > 1 {
+                if probability < 0.02 {
+                    continue;
+                }
+                let angle_deg = finding.twins.iter().map(|(_, a)| *a).fold(0.0, f64::max);
+                let names: Vec<String> = members.iter().map(|n| LIBRARY[*n].name().to_owned()).collect();
+                groups.push(Group { members: names.clone(), angle_deg, probability });
+                done.extend(&members);
+                if probability > NAMED && in_best {
+                    verdict.push(Verdict::Group { members: names, angle_deg });
+                }
+            } else if probability > NAMED && in_best {
+                done.push(finding.number);
+                verdict.push(Verdict::Name(LIBRARY[finding.number].name().to_owned()));
+            }
+        }
+        (groups, verdict)
+    }
+
+    fn unknown(&self, attribution: &Attribution, best: &Model) -> Unknown {
+        let mut square = 0.0;
+        let mut known = 0.0;
+        let mut strongest: Option<(f64, &Pattern)> = None;
+        for (n, b) in best.fit.set.iter().enumerate() {
+            let place = best.fit.place(&self.pool, n);
+            let size: f64 = best.fit.mean.rows(place.start, place.len()).norm_squared();
+            match &self.pool.blocks[*b].cause {
+                Cause::Unknown(pattern) => {
+                    square += size;
+                    if strongest.as_ref().is_none_or(|(s, _)| size > *s) {
+                        strongest = Some((size, pattern));
+                    }
+                }
+                Cause::Effect { .. } => known += size,
+            }
+        }
+        let rms_rad = square.sqrt();
+        // Effects are linearised and their shapes lie on grids: a small part of them may stay behind.
+        let inexact = square > 0.0 && rms_rad < INEXACT * known.sqrt();
+        let probability = if inexact { attribution.unknown.min(0.4) } else { attribution.unknown };
+        let location = strongest.filter(|_| probability > 0.1).map(|(_, pattern)| UnknownLocation {
+            description: pattern.describe(),
+            signature: pattern.signature(),
+        });
+        Unknown { probability: probability.min(1.0), rms_rad, location }
+    }
+
+    /// Shares of the reducible gap: each effect's part of the whole fitted trace.
+    fn budget(&self, best: &Model, lines: &[LineError], reducible: f64) -> Vec<crate::gap::diagnosis::BudgetRow> {
+        use crate::gap::diagnosis::BudgetRow;
+        let mut rows = Vec::new();
+        if reducible <= 0.0 {
+            return rows;
+        }
+        let columns = &best.fit.columns;
+        let products = &self.pool.products;
+        let weight = products[(1, 1)];
+        let centred = |a: usize, b: usize| (products[(a, b)] - products[(a, 1)] * products[(b, 1)] / weight) / weight;
+        let covariance = |a: std::ops::Range<usize>, beta: &dyn Fn(usize) -> f64| -> f64 {
+            a.map(|m| {
+                (1..columns.len()).map(|n| beta(m) * beta(n) * centred(columns[m], columns[n])).sum::<f64>()
+            })
+            .sum()
+        };
+        let mean = |n: usize| best.fit.mean[n];
+        let mut explained = 0.0;
+        for (n, b) in best.fit.set.iter().enumerate() {
+            let place = best.fit.place(&self.pool, n);
+            let share = covariance(place.clone(), &mean) / reducible;
+            let deviation = place
+                .clone()
+                .map(|m| best.fit.covariance[(m, m)])
+                .sum::<f64>()
+                .sqrt()
+                * 2.0
+                * (share.abs() / reducible).sqrt();
+            explained += share;
+            let effect = match &self.pool.blocks[*b].cause {
+                Cause::Effect { effect, .. } => effect.name().to_owned(),
+                Cause::Unknown(pattern) => format!("unknown: {}", pattern.describe()),
+            };
+            rows.push(BudgetRow { effect, share, interval: Some([share - 1.645 * deviation, share + 1.645 * deviation]) });
+        }
+        for line in lines {
+            let share = line.explained_rad2 / self.grid.samples / reducible;
+            explained += share;
+            let effect = ["encoder1_interpolation", "encoder2_interpolation"][line.encoder].to_owned();
+            match rows.iter_mut().find(|row| row.effect == effect) {
+                Some(row) => row.share += share,
+                None => rows.push(BudgetRow { effect, share, interval: None }),
+            }
+        }
+        rows.sort_by(|a, b| b.share.total_cmp(&a.share));
+        rows.push(BudgetRow { effect: "unexplained".to_owned(), share: 1.0 - explained, interval: None });
+        rows
+    }
+
+    /// The effects of the verdict with their amplitudes; of a group its most probable member.
+    fn found(&self, findings: &[Finding], verdict: &[Verdict]) -> Found {
+        let effects = verdict
+            .iter()
+            .filter_map(|item| {
+                let names: Vec<&str> = match item {
+                    Verdict::Name(name) => vec![name],
+                    Verdict::Group { members, .. } => members.iter().map(String::as_str).collect(),
+                };
+                findings
+                    .iter()
+                    .find(|f| names.contains(&LIBRARY[f.number].name()))
+                    .and_then(|f| Some(FoundEffect { effect: LIBRARY[f.number], shape: f.shape.clone(), estimate: f.estimate.clone()? }))
+            })
+            .collect();
+        Found { rig: Some(self.rig.clone()), effects }
+    }
+
+    fn confusability(&self, findings: &[Finding], best: &Model) -> Confusability {
+        let mut chosen: Vec<&Finding> = findings.iter().filter(|f| f.block.is_some()).collect();
+        // Those that matter first: in the model or probable; then the rest up to a readable table.
+        chosen.sort_by_key(|f| !f.block.is_some_and(|b| best.fit.set.contains(&b)));
+        chosen.truncate(16);
+        let names = chosen.iter().map(|f| LIBRARY[f.number].name().to_owned()).collect();
+        let angle_deg = chosen
+            .iter()
+            .map(|a| {
+                chosen
+                    .iter()
+                    .map(|b| match (a.block, b.block) {
+                        (Some(a), Some(b)) if a != b => attribute::angle_deg(&self.pool, &self.whitened, a, b),
+                        _ => 0.0,
+                    })
+                    .collect()
+            })
+            .collect();
+        Confusability { names, angle_deg }
+    }
+
+    /// Sums of two named effects that a third could feign, and the other way round.
+    fn mimics(&self, findings: &[Finding], verdict: &[Verdict]) -> Vec<String> {
+        let named: Vec<&Finding> = findings
+            .iter()
+            .filter(|f| f.block.is_some() && f.probability > 0.3)
+            .collect();
+        let mut warnings = Vec::new();
+        if verdict.is_empty() {
+            return warnings;
+        }
+        for target in findings.iter().filter(|f| f.probability < 0.3 && f.block.is_some()) {
+            let Some(block) = target.block else { continue };
+            if self.pool.blocks[block].width() > 4 {
+                continue;
+            }
+            for (n, a) in named.iter().enumerate() {
+                for b in &named[n + 1..] {
+                    let (Some(x), Some(y)) = (a.block, b.block) else { continue };
+                    if self.pool.blocks[x].width() + self.pool.blocks[y].width() > 8 {
+                        continue;
+                    }
+                    if self.angle_to_sum_deg(block, x, y) < 4.0 {
+                        warnings.push(format!(
+                            "{} + {} together can look like {} under this plan: their sum stands under 4 deg from it",
+                            LIBRARY[a.number].name(),
+                            LIBRARY[b.number].name(),
+                            LIBRARY[target.number].name()
+                        ));
+                    }
+                }
+            }
+        }
+        warnings
+    }
+
+    /// Largest angle from a block to the sum of two others, deg.
+    fn angle_to_sum_deg(&self, target: usize, a: usize, b: usize) -> f64 {
+        let g = &self.whitened.gram;
+        let zero = g[(1, 1)];
+        let entry = |m: usize, n: usize| g[(m, n)] - g[(m, 1)] * g[(n, 1)] / zero;
+        let sum: Vec<usize> =
+            self.pool.blocks[a].columns.clone().chain(self.pool.blocks[b].columns.clone()).collect();
+        let own: Vec<usize> = self.pool.blocks[target].columns.clone().collect();
+        let part = |rows: &[usize], columns: &[usize]| {
+            nalgebra::DMatrix::from_fn(rows.len(), columns.len(), |m, n| entry(rows[m], columns[n]))
+        };
+        let mut gram = part(&sum, &sum);
+        let ridge = 1e-10 * gram.diagonal().max();
+        for n in 0..sum.len() {
+            gram[(n, n)] += ridge;
+        }
+        let (Some(ls), Some(lo)) =
+            (nalgebra::Cholesky::new(gram), nalgebra::Cholesky::new(part(&own, &own)))
+        else {
+            return 90.0;
+        };
+        let Some(left) = ls.l().solve_lower_triangular(&part(&sum, &own)) else { return 90.0 };
+        let Some(both) = lo.l().solve_lower_triangular(&left.transpose()) else { return 90.0 };
+        let smallest = both.singular_values().iter().copied().fold(1.0, f64::min);
+        smallest.clamp(0.0, 1.0).acos().to_degrees()
+    }
+}
+
+fn findings_for_next(findings: &[Finding], groups: &[Group]) -> next::Open {
+    next::Open {
+        groups: groups.iter().filter(|g| g.probability > 0.2).map(|g| g.members.clone()).collect(),
+        unsure: findings
+            .iter()
+            .filter(|f| f.probability > 0.05 && f.probability < 0.95 && f.twins.is_empty())
+            .map(|f| LIBRARY[f.number].name().to_owned())
+            .collect(),
+    }
+}
+
+/// A parameter as the contract writes it.
+fn parameter(parameter: &Parameter) -> Json {
+    let value = match &parameter.value {
+        Value::Number(x) => json!(x),
+        Value::Table(values) => json!(values),
+        Value::Text(text) => json!(text),
+    };
+    json!({"value": value, "std": parameter.std, "unit": parameter.unit})
+}

@@ -1,0 +1,101 @@
+//! `diagnose`: the gap between a pair's nominal model and recordings.
+
+use gearmodel::Direction;
+use gearmodel::gap::{self, Options};
+use numpy::PyArray1;
+use pyo3::prelude::*;
+
+use crate::array::Numbers;
+use crate::error::{Raised, Result};
+use crate::pair::GearPair;
+use crate::recording::Recording;
+
+impl From<gap::GapError> for Raised {
+    fn from(error: gap::GapError) -> Self {
+        pyo3::exceptions::PyValueError::new_err(error.to_string()).into()
+    }
+}
+
+/// The native half of a diagnosis.
+#[pyclass(frozen, module = "gearmodel._native", name = "NativeDiagnosis")]
+pub struct NativeDiagnosis {
+    diagnosis: gap::Diagnosis,
+    nominal: gap::Nominal,
+}
+
+#[pymethods]
+impl NativeDiagnosis {
+    /// All fields as JSON text.
+    fn to_json(&self) -> String {
+        self.diagnosis.to_json()
+    }
+
+    /// A self-contained page.
+    fn to_html(&self) -> String {
+        gap::html::page(&self.diagnosis)
+    }
+
+    /// The summary for people.
+    fn summary(&self) -> String {
+        gap::summary::text(&self.diagnosis)
+    }
+
+    /// (label, theta1_rad, before_rad, after_rad) of every run.
+    fn curves<'py>(&self, py: Python<'py>) -> Vec<CurveArrays<'py>> {
+        self.diagnosis
+            .curves
+            .iter()
+            .map(|c| {
+                (
+                    c.label.clone(),
+                    PyArray1::from_slice(py, &c.theta1_rad),
+                    PyArray1::from_slice(py, &c.before_rad),
+                    PyArray1::from_slice(py, &c.after_rad),
+                )
+            })
+            .collect()
+    }
+
+    /// TE of the nominal model with the found effects, and its standard deviation, rad.
+    #[pyo3(signature = (theta1, *, direction, load_nm, speed_rpm, time_s, revolutions))]
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        theta1: &Bound<'py, PyAny>,
+        direction: &str,
+        load_nm: f64,
+        speed_rpm: f64,
+        time_s: f64,
+        revolutions: f64,
+    ) -> Result<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let direction: Direction = direction.parse()?;
+        let at = gap::predict::Condition { direction, load_nm, speed_rpm, time_s, revolutions };
+        let found = &self.diagnosis.found;
+        let theta1 = Numbers::take("theta1", theta1)?;
+        let te = theta1.map(py, |theta1_rad| {
+            self.nominal.te_rad(theta1_rad, direction, load_nm) + found.te_rad(theta1_rad, &at).0
+        })?;
+        let std = theta1.map(py, |theta1_rad| found.te_rad(theta1_rad, &at).1)?;
+        Ok((te, std))
+    }
+}
+
+type CurveArrays<'py> = (String, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
+/// The gap between a pair's nominal model and recordings; see `gearmodel.diagnose`.
+#[pyfunction]
+#[pyo3(signature = (recordings, pair, known, exclude))]
+pub fn diagnose(
+    py: Python<'_>,
+    recordings: Vec<Bound<'_, Recording>>,
+    pair: &Bound<'_, GearPair>,
+    known: Vec<String>,
+    exclude: Vec<String>,
+) -> Result<NativeDiagnosis> {
+    let reads: Vec<_> = recordings.iter().map(|r| r.get().read(py)).collect();
+    let recordings = reads.iter().map(|read| read.recording()).collect::<Result<Vec<_>>>()?;
+    let model = pair.get().model.clone();
+    let options = Options { known, exclude };
+    let (diagnosis, nominal) = py.detach(|| gap::diagnose_with_nominal(&recordings, &model, &options))?;
+    Ok(NativeDiagnosis { diagnosis, nominal })
+}
