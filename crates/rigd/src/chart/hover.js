@@ -14,7 +14,8 @@ svg.addEventListener("pointermove", (event) => {
   if (!panel) { box.style.display = "none"; return; }
   const [left, right, top, bottom] = panel.px, [x0, x1, y0, y1] = panel.at;
   const toX = (x) => left + (x - x0) / (x1 - x0) * (right - left);
-  const toY = (y) => bottom - (y - y0) / (y1 - y0) * (bottom - top);
+  const height = (y) => (panel.log ? Math.log10(y) : y);
+  const toY = (y) => bottom - (height(y) - y0) / (y1 - y0) * (bottom - top);
   let found = [];
   for (const series of panel.series) {
     let best = null, least = Infinity;

@@ -28,8 +28,8 @@ pub struct Panel {
     pub x: Axis,
     /// Quantity and unit of the vertical axis.
     pub y_label: String,
-    /// The same scale on both axes, as a drawing needs it.
-    pub equal_scale: bool,
+    /// How the axes are divided.
+    pub scale: Scale,
     /// The curves, later ones above earlier ones.
     pub series: Vec<Series>,
 }
@@ -41,6 +41,18 @@ pub enum Axis {
     Turn,
     /// As far as the points reach; quantity and unit.
     Fitted(String),
+}
+
+/// How the axes of a panel are divided.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Scale {
+    /// Each by itself.
+    #[default]
+    Free,
+    /// A unit is as long on both, as a drawing needs it.
+    Equal,
+    /// The vertical one by powers of ten; points at or below 0 are left out.
+    Logarithmic,
 }
 
 /// A curve or a cloud of points.
@@ -65,6 +77,8 @@ pub enum Mark {
     Rings(usize),
     /// Small dots.
     Dots,
+    /// Vertical lines from the axis up to the points.
+    Stems,
 }
 
 /// What a colour stands for, the same in every picture.
@@ -113,7 +127,7 @@ impl Panel {
     /// A panel over one turn of θ1.
     #[must_use]
     pub fn over_turn(title: impl Into<String>, y_label: impl Into<String>, series: Vec<Series>) -> Self {
-        Self { title: title.into(), x: Axis::Turn, y_label: y_label.into(), equal_scale: false, series }
+        Self { title: title.into(), x: Axis::Turn, y_label: y_label.into(), scale: Scale::Free, series }
     }
 }
 

@@ -8,7 +8,7 @@ use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::{Axis, Chart, ChartError, Mark, Panel, Series, font};
+use super::{Axis, Chart, ChartError, Mark, Panel, Scale, Series, font};
 
 /// Width of a chart, px.
 const WIDTH_PX: u32 = 960;
@@ -63,7 +63,7 @@ fn size_px(chart: &Chart) -> (u32, u32) {
 /// A panel of equal scales is as tall as its points ask for.
 fn height_px(panel: &Panel) -> u32 {
     match bounds(panel) {
-        Some((x, y)) if panel.equal_scale => {
+        Some((x, y)) if panel.scale == Scale::Equal => {
             let width = f64::from(WIDTH_PX - 2 * MARGIN_PX - Y_LABELS_PX);
             let around = f64::from(2 * MARGIN_PX + X_LABELS_PX + TITLE_PX);
             let height = around + width * (y.end - y.start) / (x.end - x.start);
@@ -96,14 +96,37 @@ where
     panels().map_err(ChartError::Draw)
 }
 
-fn finite(series: &Series) -> impl Iterator<Item = (f64, f64)> {
-    series.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite())
+/// The points where they stand on the axes.
+fn finite(series: &Series, scale: Scale) -> impl Iterator<Item = (f64, f64)> {
+    let placed = series.points.iter().map(move |(x, y)| (*x, scale.height(*y)));
+    placed.filter(|(x, y)| x.is_finite() && y.is_finite())
+}
+
+impl Scale {
+    /// Where a value stands on the vertical axis; not finite where it has no place.
+    pub(super) fn height(self, y: f64) -> f64 {
+        match self {
+            Self::Free | Self::Equal => y,
+            Self::Logarithmic => y.log10(),
+        }
+    }
+
+    /// What stands beside a place on the vertical axis.
+    fn label(self, at: f64, decimals: usize) -> String {
+        match self {
+            Self::Free | Self::Equal => format!("{at:.decimals$}"),
+            // Powers of ten alone: what stands between them is told by the distance.
+            Self::Logarithmic if (at - at.round()).abs() > 1e-6 => String::new(),
+            Self::Logarithmic if at < -3.5 => format!("{:.0e}", 10_f64.powf(at)),
+            Self::Logarithmic => 10_f64.powf(at.round()).to_string(),
+        }
+    }
 }
 
 /// Ranges of the axes with their margins; `None` without points.
 fn bounds(panel: &Panel) -> Option<(Range<f64>, Range<f64>)> {
     let reach = |value: fn((f64, f64)) -> f64| {
-        let values = panel.series.iter().flat_map(finite).map(value);
+        let values = panel.series.iter().flat_map(|series| finite(series, panel.scale)).map(value);
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
     };
     let (low, high) = reach(|(_, y)| y);
@@ -123,7 +146,7 @@ fn bounds(panel: &Panel) -> Option<(Range<f64>, Range<f64>)> {
         Axis::Fitted(_) => margin(left, right, 0.02),
     };
     // Above the curves: room for the legend.
-    let headroom = if panel.equal_scale { 1.0 } else { 1.0 + panel.series.len() as f64 };
+    let headroom = if panel.scale == Scale::Equal { 1.0 } else { 1.0 + panel.series.len() as f64 };
     Some((left - x_margin..right + x_margin, low - y_margin..high + headroom * y_margin))
 }
 
@@ -152,7 +175,7 @@ where
     let Some(mut ranges) = bounds(panel) else { return Ok(None) };
     // The font reaches above the line that plotters allots to a title.
     let area = area.margin(6 * scale, 0, 0, 0).titled(&panel.title, (font::SANS, 18 * scale))?;
-    if panel.equal_scale {
+    if panel.scale == Scale::Equal {
         ranges = equalise(ranges, area.dim_in_pixel(), scale);
     }
     let (x, y) = ranges;
@@ -187,6 +210,7 @@ where
     // Plotters takes lengths of marks as i32.
     let px = scale as i32;
     let text = (font::SANS, 12 * scale);
+    let bottom = chart.as_coord_spec().y_spec().range().start;
     chart
         .configure_mesh()
         .label_style(text)
@@ -197,7 +221,7 @@ where
         .y_desc(panel.y_label.as_str())
         .x_labels(9)
         .x_label_formatter(&|value| format!("{value:.x_decimals$}"))
-        .y_label_formatter(&|value| format!("{value:.y_decimals$}"))
+        .y_label_formatter(&|value| panel.scale.label(*value, y_decimals))
         .light_line_style(TRANSPARENT)
         .bold_line_style(BLACK.mix(0.12))
         .draw()?;
@@ -207,7 +231,16 @@ where
             Mark::Line => {
                 let style = colour.stroke_width(scale);
                 chart
-                    .draw_series(LineSeries::new(finite(series), style))?
+                    .draw_series(LineSeries::new(finite(series, panel.scale), style))?
+                    .label(series.name.as_str())
+                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 20 * px, y)], style));
+                continue;
+            }
+            Mark::Stems => {
+                let style = colour.stroke_width(scale);
+                let stem = |(x, y): (f64, f64)| PathElement::new([(x, bottom), (x, y)], style);
+                chart
+                    .draw_series(finite(series, panel.scale).map(stem))?
                     .label(series.name.as_str())
                     .legend(move |(x, y)| PathElement::new([(x, y), (x + 20 * px, y)], style));
                 continue;
@@ -216,7 +249,7 @@ where
             Mark::Dots => (1, px, colour.filled()),
         };
         chart
-            .draw_series(finite(series).step_by(every).map(|point| Circle::new(point, size, style)))?
+            .draw_series(finite(series, panel.scale).step_by(every).map(|point| Circle::new(point, size, style)))?
             .label(series.name.as_str())
             .legend(move |(x, y)| Circle::new((x + 10 * px, y), 3 * px, style));
     }
