@@ -11,6 +11,7 @@ TE_cw - TE_ccw at equal theta1.
 1108.4 urad
 """
 
+from . import cluster
 from ._analysis import Floor, OrderSpectrum, Spectra, SynchronousAverage, Waves, WaveSplit
 from ._native import (
     Analysis,
@@ -64,6 +65,7 @@ __all__ = [
     "Waves",
     "analyse",
     "backlash_from",
+    "cluster",
     "read_log",
     "sweep",
 ]
