@@ -2,7 +2,9 @@
 const NS = "http://www.w3.org/2000/svg";
 const svg = document.querySelector("#chart svg");
 const box = document.getElementById("values");
+// The drawing counts in parts of a pixel, the pointer in pixels.
 const marks = svg.appendChild(document.createElementNS(NS, "g"));
+marks.setAttribute("transform", `scale(${svg.viewBox.baseVal.width / svg.width.baseVal.value})`);
 const number = (value) => Number(value.toPrecision(6)).toString();
 
 svg.addEventListener("pointerleave", () => { box.style.display = "none"; marks.replaceChildren(); });

@@ -19,6 +19,8 @@ pub fn page(chart: &Chart) -> Result<String, ChartError> {
         .zip(&frames)
         .filter_map(|(panel, frame)| {
             let frame = frame.as_ref()?;
+            let parts = [frame.x_px.start, frame.x_px.end, frame.y_px.start, frame.y_px.end];
+            let px = parts.map(|parts| f64::from(parts) / f64::from(render::SVG_SCALE));
             let series: Vec<_> = panel
                 .series
                 .iter()
@@ -37,7 +39,7 @@ pub fn page(chart: &Chart) -> Result<String, ChartError> {
                 "y": panel.y_label,
                 "nearest": panel.scale == Scale::Equal,
                 "log": panel.scale == Scale::Logarithmic,
-                "px": [frame.x_px.start, frame.x_px.end, frame.y_px.start, frame.y_px.end],
+                "px": px,
                 "at": [frame.x.start, frame.x.end, frame.y.start, frame.y.end],
                 "series": series,
             }))

@@ -22,6 +22,14 @@ const X_LABELS_PX: u32 = 34;
 const Y_LABELS_PX: u32 = 64;
 const TITLE_PX: u32 = 30;
 
+/// Height of a legend, px: of a line, and around the lines.
+const LEGEND_LINE_PX: u32 = 15;
+const LEGEND_AROUND_PX: u32 = 26;
+/// Lines of a legend that a panel of the usual height holds above its curves.
+const LEGEND_LINES: u32 = 2;
+
+/// Parts of a pixel in an SVG: plotters rounds places to whole ones, which makes stairs of flat curves.
+pub const SVG_SCALE: u32 = 10;
 /// Pixels of a PNG for each of the sizes above: screens show more than 96 dots an inch.
 const PNG_SCALE: u32 = 2;
 
@@ -40,8 +48,16 @@ pub struct Frame {
 
 /// The chart as SVG and where its panels are; `None` for a panel without points.
 pub fn svg(chart: &Chart) -> Result<(String, Vec<Option<Frame>>), ChartError> {
+    let (width, height) = size_px(chart);
+    let (parts_x, parts_y) = (SVG_SCALE * width, SVG_SCALE * height);
     let mut text = String::new();
-    let frames = draw(chart, SVGBackend::with_string(&mut text, size_px(chart)), 1)?;
+    let frames = draw(chart, SVGBackend::with_string(&mut text, (parts_x, parts_y)), SVG_SCALE)?;
+    // The same picture in pixels: the view box keeps the parts.
+    let text = text.replacen(
+        &format!("width=\"{parts_x}\" height=\"{parts_y}\""),
+        &format!("width=\"{width}\" height=\"{height}\""),
+        1,
+    );
     Ok((text, frames))
 }
 
@@ -70,8 +86,21 @@ fn height_px(panel: &Panel) -> u32 {
             // The clamp keeps it in the range of u32.
             height.clamp(f64::from(PANEL_PX), f64::from(TALLEST_PX)) as u32
         }
-        _ => PANEL_PX,
+        _ => PANEL_PX + LEGEND_LINE_PX * legend_lines(panel).saturating_sub(LEGEND_LINES),
     }
+}
+
+fn legend_lines(panel: &Panel) -> u32 {
+    // A picture has a handful.
+    panel.series.len() as u32
+}
+
+/// Share of the height of the axes that the legend takes, above the curves.
+fn legend_share(panel: &Panel) -> f64 {
+    let lines = legend_lines(panel);
+    let legend = LEGEND_LINE_PX * lines + LEGEND_AROUND_PX;
+    let height = PANEL_PX + LEGEND_LINE_PX * lines.saturating_sub(LEGEND_LINES);
+    f64::from(legend) / f64::from(height - 2 * MARGIN_PX - X_LABELS_PX - TITLE_PX)
 }
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -114,7 +143,7 @@ impl Scale {
     /// What stands beside a place on the vertical axis.
     fn label(self, at: f64, decimals: usize) -> String {
         match self {
-            Self::Free | Self::Equal => format!("{at:.decimals$}"),
+            Self::Free | Self::Equal => number(at, decimals),
             // Powers of ten alone: what stands between them is told by the distance.
             Self::Logarithmic if (at - at.round()).abs() > 1e-6 => String::new(),
             Self::Logarithmic if at < -3.5 => format!("{:.0e}", 10_f64.powf(at)),
@@ -145,9 +174,15 @@ fn bounds(panel: &Panel) -> Option<(Range<f64>, Range<f64>)> {
         Axis::Turn => 0.0,
         Axis::Fitted(_) => margin(left, right, 0.02),
     };
-    // Above the curves: room for the legend.
-    let headroom = if panel.scale == Scale::Equal { 1.0 } else { 1.0 + panel.series.len() as f64 };
-    Some((left - x_margin..right + x_margin, low - y_margin..high + headroom * y_margin))
+    // Above the curves: room for the legend, share = headroom/(curves + margin + headroom).
+    let headroom = match panel.scale {
+        Scale::Equal => y_margin,
+        Scale::Free | Scale::Logarithmic => {
+            let share = legend_share(panel);
+            share / (1.0 - share) * (high - low + y_margin).max(y_margin)
+        }
+    };
+    Some((left - x_margin..right + x_margin, low - y_margin..high + headroom))
 }
 
 /// Widens one of the ranges so that a unit is as long on both axes.
@@ -160,6 +195,15 @@ fn equalise((x, y): (Range<f64>, Range<f64>), (width, height): (u32, u32), scale
         middle - half..middle + half
     };
     (widen(x, width), widen(y, height))
+}
+
+/// A label; what rounds to 0 has no sign.
+fn number(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(zero) if zero.bytes().all(|byte| matches!(byte, b'0' | b'.')) => zero.to_owned(),
+        _ => text,
+    }
 }
 
 /// Decimals that tell the labels of a range apart.
@@ -183,7 +227,8 @@ where
     builder.margin(scale * MARGIN_PX).x_label_area_size(scale * X_LABELS_PX).y_label_area_size(scale * Y_LABELS_PX);
     let (x_px, y_px) = match &panel.x {
         Axis::Turn => {
-            let mut chart = builder.build_cartesian_2d(x.clone().step(45.0), y.clone())?;
+            // The label of the full turn stands at its very end.
+            let mut chart = builder.build_cartesian_2d((x.start..x.end + 1e-6).step(45.0), y.clone())?;
             fill(&mut chart, panel, "θ1 / °", (0, decimals(&y)), scale)?
         }
         Axis::Fitted(label) => {
@@ -220,10 +265,10 @@ where
         .x_desc(x_label)
         .y_desc(panel.y_label.as_str())
         .x_labels(9)
-        .x_label_formatter(&|value| format!("{value:.x_decimals$}"))
+        .x_label_formatter(&|value| number(*value, x_decimals))
         .y_label_formatter(&|value| panel.scale.label(*value, y_decimals))
         .light_line_style(TRANSPARENT)
-        .bold_line_style(BLACK.mix(0.12))
+        .bold_line_style(BLACK.mix(0.12).stroke_width(scale))
         .draw()?;
     for series in &panel.series {
         let colour = series.ink.colour();
@@ -260,7 +305,7 @@ where
         .legend_area_size(30 * px)
         .margin(10 * scale)
         .background_style(WHITE.mix(0.8))
-        .border_style(BLACK.mix(0.2))
+        .border_style(BLACK.mix(0.2).stroke_width(scale))
         .draw()?;
     Ok(chart.plotting_area().get_pixel_range())
 }
