@@ -236,6 +236,31 @@ mod tests {
     }
 
     #[test]
+    fn powers_of_ten_have_no_place_for_zero() {
+        let points = vec![(1.0, 1000.0), (2.0, 0.0), (3.0, 0.01), (4.0, -1.0)];
+        let series = Series { name: "orders".into(), ink: Ink::Ccw, mark: Mark::Stems, points };
+        let panel = Panel {
+            x: Axis::Fitted("order".into()),
+            scale: Scale::Logarithmic,
+            ..Panel::over_turn("Orders", "amplitude / µrad", vec![series])
+        };
+        let chart = Chart { panels: vec![panel] };
+        let page = String::from_utf8(chart.encode(Format::Html).unwrap()).unwrap();
+        assert!(page.contains("\"log\":true") && page.contains("[[1.0,1000.0],[3.0,0.01]]"), "{page}");
+        let svg = chart.svg().unwrap();
+        assert!(svg.contains(">\n1000\n<") && svg.contains(">\n0.01\n<"), "{svg}");
+        // Two stems and what the legend shows of them.
+        assert_eq!(svg.matches("#005AA0").count(), 3, "{svg}");
+    }
+
+    #[test]
+    fn a_drawing_counts_in_parts_of_a_pixel_and_keeps_its_size() {
+        let svg = chart().svg().unwrap();
+        assert!(svg.starts_with("<svg width=\"960\" height=\"640\" viewBox=\"0 0 9600 6400\""), "{}", &svg[..80]);
+        assert!(svg.contains(">\n360\n<"), "the full turn has its label");
+    }
+
+    #[test]
     fn names_ask_for_formats() {
         assert_eq!(Format::of(Path::new("a.PNG")).unwrap(), Format::Png);
         assert_eq!(Format::of(Path::new("-")).unwrap(), Format::Svg);

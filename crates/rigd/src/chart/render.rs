@@ -28,6 +28,9 @@ const LEGEND_AROUND_PX: u32 = 26;
 /// Lines of a legend that a panel of the usual height holds above its curves.
 const LEGEND_LINES: u32 = 2;
 
+/// Distance of stems at one place, px.
+const STEM_PX: f64 = 1.5;
+
 /// Parts of a pixel in an SVG: plotters rounds places to whole ones, which makes stairs of flat curves.
 pub const SVG_SCALE: u32 = 10;
 /// Pixels of a PNG for each of the sizes above: screens show more than 96 dots an inch.
@@ -270,6 +273,11 @@ where
         .light_line_style(TRANSPARENT)
         .bold_line_style(BLACK.mix(0.12).stroke_width(scale))
         .draw()?;
+    // Stems of several series at one place stand side by side.
+    let stems = panel.series.iter().filter(|series| series.mark == Mark::Stems).count() as f64;
+    let x_range = chart.as_coord_spec().x_spec().range();
+    let a_pixel = (x_range.end - x_range.start) / f64::from(chart.plotting_area().dim_in_pixel().0.max(1));
+    let mut aside = -0.5 * (stems - 1.0) * STEM_PX * f64::from(scale) * a_pixel;
     for series in &panel.series {
         let colour = series.ink.colour();
         let (every, size, style) = match series.mark {
@@ -283,7 +291,9 @@ where
             }
             Mark::Stems => {
                 let style = colour.stroke_width(scale);
-                let stem = |(x, y): (f64, f64)| PathElement::new([(x, bottom), (x, y)], style);
+                let shift = aside;
+                aside += STEM_PX * f64::from(scale) * a_pixel;
+                let stem = |(x, y): (f64, f64)| PathElement::new([(x + shift, bottom), (x + shift, y)], style);
                 chart
                     .draw_series(finite(series, panel.scale).map(stem))?
                     .label(series.name.as_str())

@@ -241,7 +241,7 @@ fn chart(runs: &[Figures]) -> Chart {
                     name: label(run),
                     ink: ink(runs, index),
                     mark: Mark::Stems,
-                    points: stems(spectrum, index, runs.len()),
+                    points: spectrum.lines.iter().map(|line| (line.order, URAD * line.amplitude_rad)).collect(),
                 })
             })
             .collect();
@@ -256,14 +256,6 @@ fn chart(runs: &[Figures]) -> Chart {
         }
     }
     Chart { panels }
-}
-
-/// Lines as stems on the axis; those of several runs stand side by side.
-fn stems(spectrum: &OrderSpectrum, run: usize, runs: usize) -> Vec<(f64, f64)> {
-    let step = spectrum.lines.first().map_or(1.0, |line| line.order);
-    // Within a third of the distance of two lines.
-    let shift = step / 3.0 * (run as f64 - 0.5 * (runs.max(1) - 1) as f64) / runs.max(1) as f64;
-    spectrum.lines.iter().map(|line| (line.order + shift, URAD * line.amplitude_rad)).collect()
 }
 
 /// The synchronous averages of all runs, a row a bin.
