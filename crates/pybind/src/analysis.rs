@@ -9,6 +9,7 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::array::count;
 use crate::error::{InputError, Result};
 use crate::pair::GearPair;
 use crate::recording::Recording;
@@ -79,15 +80,19 @@ pub fn analyse(
     py: Python<'_>,
     rec: &Bound<'_, Recording>,
     pair: &Bound<'_, GearPair>,
-    bins: usize,
-    highest_order: Option<u32>,
+    bins: i64,
+    highest_order: Option<i64>,
 ) -> Result<Analysis> {
+    let bins = count("bins", bins)?;
     let grid = AngleGrid::new(bins)?;
     let limit = (bins - 1) / 2;
-    let highest_order = highest_order.unwrap_or(DEFAULT_HIGHEST_ORDER.min(limit as u32));
-    if highest_order == 0 || highest_order as usize > limit {
-        return Err(InputError::HighestOrder { given: highest_order, limit, bins }.into());
-    }
+    let highest_order = match highest_order {
+        None => DEFAULT_HIGHEST_ORDER.min(limit as u32),
+        Some(given) => u32::try_from(given)
+            .ok()
+            .filter(|order| (1..=limit).contains(&(*order as usize)))
+            .ok_or(InputError::HighestOrder { given, limit, bins })?,
+    };
     let model = &pair.get().model;
     let run = run_te(py, rec, &model.pair, grid)?;
     let conditions = run.conditions();
@@ -336,8 +341,11 @@ impl Analysis {
     /// >>> a.synchronous_average("output").revolutions, round(1e6 * np.ptp(a.synchronous_average("output").te))
     /// (4, 100)
     #[pyo3(signature = (shaft="input", *, bins=None))]
-    fn synchronous_average<'py>(&self, py: Python<'py>, shaft: &str, bins: Option<usize>) -> Result<Bound<'py, PyAny>> {
-        let grid = bins.map_or(Ok(self.grid), AngleGrid::new)?;
+    fn synchronous_average<'py>(&self, py: Python<'py>, shaft: &str, bins: Option<i64>) -> Result<Bound<'py, PyAny>> {
+        let grid = match bins {
+            None => self.grid,
+            Some(bins) => AngleGrid::new(count("bins", bins)?)?,
+        };
         let pair = &self.pair.get().model.pair;
         let read = self.recording.get().read(py);
         let recording = read.recording()?;

@@ -71,6 +71,12 @@ pub fn is_scalar(given: &Bound<'_, PyAny>) -> PyResult<bool> {
         && given.hasattr(intern!(py, "__float__"))?)
 }
 
+/// A count that came as Python's integer, in the type that the model takes.
+pub fn count<T: TryFrom<i128>>(field: &'static str, given: impl Into<i128>) -> Result<T> {
+    let given = given.into();
+    T::try_from(given).map_err(|_| InputError::Count { field, given }.into())
+}
+
 /// Any array-like of real numbers as a C-contiguous float64 array, without a copy where it is one. Masked values become
 /// NaN, which is a gap everywhere else.
 pub fn array<'py>(field: &'static str, given: &Bound<'py, PyAny>) -> Result<Bound<'py, PyArrayDyn<f64>>> {

@@ -5,6 +5,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 
 use crate::analysis::{predicted, run_te};
+use crate::array::count;
 use crate::error::Result;
 use crate::pair::GearPair;
 use crate::recording::Recording;
@@ -56,9 +57,9 @@ pub fn backlash_from(
     ccw: &Bound<'_, Recording>,
     cw: &Bound<'_, Recording>,
     pair: &Bound<'_, GearPair>,
-    bins: usize,
+    bins: i64,
 ) -> Result<MeasuredBacklash> {
-    let grid = AngleGrid::new(bins)?;
+    let grid = AngleGrid::new(count("bins", bins)?)?;
     let model = &pair.get().model;
     let (ccw, cw) = (run_te(py, ccw, &model.pair, grid)?, run_te(py, cw, &model.pair, grid)?);
     let measured = ModelBacklash::of(&ccw, &cw)?;

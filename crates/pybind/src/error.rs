@@ -132,6 +132,14 @@ pub enum InputError {
         /// What numpy says.
         reason: String,
     },
+    /// A count below 0, or beyond any.
+    #[error("{field} is {given}: a whole number of at least 0 is needed, within what computers count")]
+    Count {
+        /// The argument.
+        field: &'static str,
+        /// The number given.
+        given: i128,
+    },
     /// A matrix or a single number where a list is needed.
     #[error("{field} has {dimensions} dimensions: 1 is needed")]
     Dimensions {
@@ -172,7 +180,7 @@ pub enum InputError {
     #[error("highest_order = {given} is outside 1 to {limit}: {bins} bins a turn resolve no more; take more bins")]
     HighestOrder {
         /// The order given.
-        given: u32,
+        given: i64,
         /// The highest possible.
         limit: usize,
         /// Bins a turn.

@@ -10,7 +10,7 @@ use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping};
 
-use crate::array::column;
+use crate::array::{column, count};
 use crate::error::{InputError, Result};
 use crate::errors::Errors;
 use crate::pair::GearPair;
@@ -113,7 +113,7 @@ pub fn sweep<'py>(
     direction: &str,
     method: &str,
     load_nm: f64,
-    angles: usize,
+    angles: i64,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> Result<Bound<'py, PyAny>> {
     let direction = direction.parse::<Direction>()?;
@@ -135,7 +135,7 @@ pub fn sweep<'py>(
     for item in over.items()?.iter() {
         let (name, values): (String, Bound<'_, PyAny>) = item.extract()?;
         let (parameter, unit) = parameter(&name)?;
-        let values = column("over", &values)?;
+        let values = column(parameter.name(), &values)?;
         shape.push(values.len());
         grid.push((parameter, values.iter().map(|value| value * unit).collect()));
         axes.set_item(name, PyArray1::from_vec(py, values))?;
@@ -147,7 +147,7 @@ pub fn sweep<'py>(
         over: grid,
         of: figure,
         method,
-        angles,
+        angles: count("angles", angles)?,
     };
     let heard = Progress::new(progress, shape.iter().product());
     let table = py.detach(|| sweep.run(&|done| heard.hear(done)))?;
@@ -192,11 +192,11 @@ impl GearPair {
         py: Python<'py>,
         errors: Option<&Bound<'py, Errors>>,
         sigma: Option<&Bound<'py, PyMapping>>,
-        n: usize,
-        seed: u64,
+        n: i64,
+        seed: i128,
         uniform: Option<&Bound<'py, PyMapping>>,
         load_nm: f64,
-        angles: usize,
+        angles: i64,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> Result<Bound<'py, PyAny>> {
         let mut scatter = Vec::new();
@@ -208,9 +208,10 @@ impl GearPair {
                 scatter.push((parameter, kind(width * unit)));
             }
         }
-        let study = ToleranceStudy { scatter, load_nm, pairs: n, angles, seed };
+        let (pairs, angles, seed) = (count("n", n)?, count("angles", angles)?, count("seed", seed)?);
+        let study = ToleranceStudy { scatter, load_nm, pairs, angles, seed };
         let model = self.model_with(errors.map(Bound::get));
-        let heard = Progress::new(progress, n);
+        let heard = Progress::new(progress, pairs);
         let figures = py.detach(|| study.run(&model, &|done| heard.hear(done)))?;
         heard.finish()?;
         let tables = PyList::empty(py);

@@ -7,7 +7,9 @@ import gearmodel as gm
 
 
 def _found():
-    return [test for test in doctest.DocTestFinder(exclude_empty=True).find(gm, "gearmodel") if test.examples]
+    finder = doctest.DocTestFinder(exclude_empty=True)
+    tests = finder.find(gm, "gearmodel") + finder.find(gm.cluster, "gearmodel.cluster")
+    return [test for test in tests if test.examples]
 
 
 def test_doctests():
@@ -16,7 +18,7 @@ def test_doctests():
     for test in tests:
         runner.run(test)
     assert runner.failures == 0
-    assert {"gearmodel", "gearmodel.GearPair.theta2", "gearmodel.Recording.split", "gearmodel.analyse"} <= {
+    assert {"gearmodel", "gearmodel.GearPair.theta2", "gearmodel.Recording.split", "gearmodel.analyse", "gearmodel.cluster"} <= {
         test.name for test in tests
     }
 

@@ -214,3 +214,27 @@ def test_pair_files_that_cannot_be_read(tmp_path):
 def test_exceptions_travel_between_processes():
     error = pickle.loads(pickle.dumps(gm.GeometryError("centre distance")))
     assert type(error) is gm.GeometryError and isinstance(error, ValueError) and str(error) == "centre distance"
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda pair: pair.tolerance(sigma={"e1_mm": 0.1}, n=-1), "n"),
+        (lambda pair: pair.tolerance(sigma={"e1_mm": 0.1}, n=10, seed=-1), "seed"),
+        (lambda pair: pair.tolerance(sigma={"e1_mm": 0.1}, n=10, angles=-1), "angles"),
+        (lambda pair: gm.sweep(pair, over={"e1_mm": [0.1]}, angles=-1), "angles"),
+        (lambda pair: pair.flank(n=-1), "n"),
+        (lambda pair: pair.outline(points_per_tooth=-1), "points_per_tooth"),
+        (lambda pair: gm.analyse(gm.Recording([0], [0], [0], 0, 0, "ccw"), pair, bins=-1), "bins"),
+        (lambda pair: gm.analyse(gm.Recording([0], [0], [0], 0, 0, "ccw"), pair, highest_order=-1), "highest_order"),
+    ],
+)
+def test_negative_counts_are_named(pair, call, field):
+    with pytest.raises(ValueError, match=rf"^{field} (is|=) -1"):
+        call(pair)
+
+
+def test_an_axis_of_a_sweep_is_named(pair):
+    with pytest.raises(ValueError, match="e1_mm has 0 dimensions"):
+        gm.sweep(pair, over={"e1_mm": 0.1})
+    assert pair.tolerance(sigma={"e1_mm": 0.1}, n=10, seed=2**64 - 1)["te_ccw_pp_rad"].std_rad > 0

@@ -235,8 +235,14 @@ impl Kind {
         if !(step > 0.0 && last >= first && count < RANGE_LIMIT as f64) {
             return Err(bad());
         }
-        Ok((0..=count as usize).map(|i| first + step * i as f64).collect())
+        Ok((0..=count as usize).map(|i| tidy(first + step * i as f64)).collect())
     }
+}
+
+/// The value to 13 figures, as a person would have written it: 0.3, not 0.1 + 2 · 0.1 = 0.30000000000000004.
+#[must_use]
+pub fn tidy(value: f64) -> f64 {
+    format!("{value:.12e}").parse().unwrap_or(value)
 }
 
 #[cfg(test)]
@@ -257,7 +263,7 @@ mod tests {
     #[test]
     fn reads_lists_and_ranges() {
         assert_eq!(TORQUE.parse_list("5..15Nm:5"), Ok(vec![5.0, 10.0, 15.0]));
-        assert_eq!(TORQUE.parse_list("0.1..0.3Nm:0.1").map(|v| v.len()), Ok(3));
+        assert_eq!(TORQUE.parse_list("0.1..0.3Nm:0.1"), Ok(vec![0.1, 0.2, 0.3]));
         assert_eq!(TORQUE.parse_list("1Nm,500mNm"), Ok(vec![1.0, 0.5]));
         assert!(matches!(TORQUE.parse_list("15..5Nm:5"), Err(QuantityError::BadRange { .. })));
         assert!(matches!(TORQUE.parse_list("5..15Nm:0"), Err(QuantityError::BadRange { .. })));

@@ -4,12 +4,13 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use gearmodel::NominalModel;
 use gearmodel::measure::RunConditions;
 use riglog::{LogError, RunSpan, RunStream, RunTotals, RunVisitor, SampleBlock};
 use thiserror::Error;
 
 use crate::analysis::Analysis;
-use crate::pair::PairError;
+use crate::pair::{self, PairError};
 
 /// Why a log cannot be replayed.
 #[derive(Debug, Error)]
@@ -31,6 +32,9 @@ pub enum ReplayError {
         /// What is wrong.
         source: PairError,
     },
+    /// The pair of another file.
+    #[error(transparent)]
+    OtherPair(PairError),
 }
 
 /// What a replay found beside TE and backlash.
@@ -51,6 +55,23 @@ pub fn head(path: &Path) -> Result<(Option<String>, String), LogError> {
     let pair = stream.attachment("pair.toml").map(|text| String::from_utf8_lossy(text).into_owned());
     let backend = stream.metadata().map(|run| run.backend.clone()).unwrap_or_default();
     Ok((pair, backend))
+}
+
+/// The model that a log is compared with, its own or that of another file, and the log's backend.
+///
+/// # Errors
+/// [`ReplayError`] when the log cannot be read, or neither gives a valid pair.
+pub fn model_for(path: &Path, other: Option<&Path>) -> Result<(NominalModel, String), ReplayError> {
+    let (pair_in_log, backend) = head(path)?;
+    let model = match other {
+        Some(other) => pair::load(Some(other)).map_err(ReplayError::OtherPair)?.1,
+        None => {
+            let text = pair_in_log.ok_or_else(|| ReplayError::NoPair { path: path.into() })?;
+            pair::parse(&text, Path::new("pair.toml"))
+                .map_err(|source| ReplayError::Pair { path: path.into(), source })?
+        }
+    };
+    Ok((model, backend))
 }
 
 /// Paces a replay by the recorded time.

@@ -11,6 +11,7 @@ TE_cw - TE_ccw at equal theta1.
 1108.4 urad
 """
 
+from . import cluster
 from ._analysis import Floor, OrderSpectrum, Spectra, SynchronousAverage, Waves, WaveSplit
 from ._diagnosis import CalibratedModel, Diagnosis, diagnose
 from ._native import (
@@ -67,6 +68,7 @@ __all__ = [
     "Waves",
     "analyse",
     "backlash_from",
+    "cluster",
     "diagnose",
     "read_log",
     "sweep",

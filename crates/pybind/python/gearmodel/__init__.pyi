@@ -1,3 +1,4 @@
+from . import cluster as cluster
 from ._analysis import (
     Floor as Floor,
     OrderSpectrum as OrderSpectrum,
@@ -58,6 +59,7 @@ __all__ = [
     "Waves",
     "analyse",
     "backlash_from",
+    "cluster",
     "read_log",
     "sweep",
 ]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from . import Analysis, MeasuredBacklash, SweepTable
 
 URAD = 1e6
-DEGREES = "driver angle theta1 / deg"
+DEGREES = "driver angle θ1 / °"
 
 
 def _figure(rows: int) -> tuple[Any, Any]:
@@ -20,6 +20,11 @@ def _figure(rows: int) -> tuple[Any, Any]:
     figure_module = require("matplotlib.figure", extra="plot", purpose="plot()")
     figure = figure_module.Figure(figsize=(8.0, 3.2 * rows), layout="constrained")
     return figure, figure.subplots(rows, 1)
+
+
+def _over_turn(axes: Any, ylabel: str) -> None:
+    axes.set(xlabel=DEGREES, ylabel=ylabel, xlim=(0, 360), xticks=range(0, 361, 45))
+    axes.grid(alpha=0.3)
 
 
 def analysis(a: Analysis) -> Any:
@@ -30,11 +35,12 @@ def analysis(a: Analysis) -> Any:
         curve.plot(degrees, URAD * revolution, color="0.8", linewidth=0.8)
     curve.plot(degrees, URAD * a.mean_curve, label="measured, mean")
     curve.plot(degrees, URAD * (a.predicted + a.zero_rad), "--", label="predicted, zero moved")
-    curve.set(xlabel=DEGREES, ylabel="TE / urad", xlim=(0, 360), title=f"{a.direction}, {a.load_nm:g} N m, {a.speed_rpm:g} rpm")
+    _over_turn(curve, "TE / µrad")
+    curve.set_title(f"{a.direction}, {a.load_nm:g} N·m, {a.speed_rpm:g} rpm")
     curve.legend()
     orders.stem(a.spectrum.orders, URAD * a.spectrum.amplitude_rad, markerfmt=" ", basefmt=" ")
     orders.axhline(URAD * a.floor, color="0.5", linestyle=":", label="floor, rms")
-    orders.set(xlabel="periods a turn of the driver", ylabel="amplitude / urad", yscale="log")
+    orders.set(xlabel="periods a turn of the driver", ylabel="amplitude / µrad", yscale="log")
     orders.legend()
     return figure
 
@@ -46,7 +52,7 @@ def backlash(b: MeasuredBacklash) -> Any:
     axes.fill_between(degrees, URAD * b.low, URAD * b.high, color="0.85", label="90 % interval")
     axes.plot(degrees, URAD * b.backlash, label="measured")
     axes.plot(degrees, URAD * b.predicted, "--", label="predicted")
-    axes.set(xlabel=DEGREES, ylabel="backlash / urad", xlim=(0, 360))
+    _over_turn(axes, "backlash / µrad")
     axes.legend()
     return figure
 
@@ -60,7 +66,8 @@ def sweep(table: SweepTable) -> Any:
     for n in range(lines.shape[1]):
         at = [f"{other} = {grid[n]:g}" for (other, _), grid in zip(others, grids, strict=True)]
         axes.plot(first, URAD * lines[:, n], label=", ".join(at))
-    axes.set(xlabel=name, ylabel=f"{table.of} / urad")
+    axes.set(xlabel=name, ylabel=f"{table.of} / µrad")
+    axes.grid(alpha=0.3)
     if others and lines.shape[1] <= 12:
         axes.legend()
     return figure

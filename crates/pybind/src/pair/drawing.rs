@@ -8,6 +8,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
 use super::GearPair;
+use crate::array::count;
 use crate::error::{InputError, Result, file_error};
 
 /// Driver or driven gear by its number.
@@ -61,9 +62,10 @@ impl GearPair {
         gear: i64,
         tooth: i64,
         side: &str,
-        n: usize,
+        n: i64,
     ) -> Result<Bound<'py, PyArray2<f64>>> {
         let (gear, tooth, side) = (self::gear(gear)?, tooth_number(tooth)?, side.parse::<Direction>()?);
+        let n = count("n", n)?;
         points(py, py.detach(|| self.model.pair.flank(gear, tooth, side, n))?)
     }
 
@@ -86,8 +88,8 @@ impl GearPair {
     /// >>> outline.shape
     /// (801, 2)
     #[pyo3(signature = (gear=1, points_per_tooth=40))]
-    fn outline<'py>(&self, py: Python<'py>, gear: i64, points_per_tooth: usize) -> Result<Bound<'py, PyAny>> {
-        let gear = self::gear(gear)?;
+    fn outline<'py>(&self, py: Python<'py>, gear: i64, points_per_tooth: i64) -> Result<Bound<'py, PyAny>> {
+        let (gear, points_per_tooth) = (self::gear(gear)?, count("points_per_tooth", points_per_tooth)?);
         let mut outline = py.detach(|| self.model.pair.outline(gear, points_per_tooth))?.points_mm;
         outline.extend(outline.first().copied());
         let layer = format!("gear{}", gear.number());
@@ -100,8 +102,8 @@ impl GearPair {
     ///     GeometryError: as :meth:`outline`.
     ///     OSError: the file cannot be written.
     #[pyo3(signature = (path, gear=1, points_per_tooth=40))]
-    fn to_dxf(&self, py: Python<'_>, path: PathBuf, gear: i64, points_per_tooth: usize) -> Result<()> {
-        let gear = self::gear(gear)?;
+    fn to_dxf(&self, py: Python<'_>, path: PathBuf, gear: i64, points_per_tooth: i64) -> Result<()> {
+        let (gear, points_per_tooth) = (self::gear(gear)?, count("points_per_tooth", points_per_tooth)?);
         let outline = py.detach(|| self.model.pair.outline(gear, points_per_tooth))?;
         let text = outline.to_dxf(&format!("gear{}", gear.number()));
         Ok(std::fs::write(&path, text).map_err(|error| file_error(&path, &error))?)
@@ -113,8 +115,8 @@ impl GearPair {
     ///     GeometryError: as :meth:`outline`.
     ///     OSError: the file cannot be written.
     #[pyo3(signature = (path, gear=1, points_per_tooth=40))]
-    fn to_svg(&self, py: Python<'_>, path: PathBuf, gear: i64, points_per_tooth: usize) -> Result<()> {
-        let gear = self::gear(gear)?;
+    fn to_svg(&self, py: Python<'_>, path: PathBuf, gear: i64, points_per_tooth: i64) -> Result<()> {
+        let (gear, points_per_tooth) = (self::gear(gear)?, count("points_per_tooth", points_per_tooth)?);
         let outline = py.detach(|| self.model.pair.outline(gear, points_per_tooth))?;
         Ok(std::fs::write(&path, outline.to_svg()).map_err(|error| file_error(&path, &error))?)
     }

@@ -2,7 +2,9 @@
 const NS = "http://www.w3.org/2000/svg";
 const svg = document.querySelector("#chart svg");
 const box = document.getElementById("values");
+// The drawing counts in parts of a pixel, the pointer in pixels.
 const marks = svg.appendChild(document.createElementNS(NS, "g"));
+marks.setAttribute("transform", `scale(${svg.viewBox.baseVal.width / svg.width.baseVal.value})`);
 const number = (value) => Number(value.toPrecision(6)).toString();
 
 svg.addEventListener("pointerleave", () => { box.style.display = "none"; marks.replaceChildren(); });
@@ -14,7 +16,8 @@ svg.addEventListener("pointermove", (event) => {
   if (!panel) { box.style.display = "none"; return; }
   const [left, right, top, bottom] = panel.px, [x0, x1, y0, y1] = panel.at;
   const toX = (x) => left + (x - x0) / (x1 - x0) * (right - left);
-  const toY = (y) => bottom - (y - y0) / (y1 - y0) * (bottom - top);
+  const height = (y) => (panel.log ? Math.log10(y) : y);
+  const toY = (y) => bottom - (height(y) - y0) / (y1 - y0) * (bottom - top);
   let found = [];
   for (const series of panel.series) {
     let best = null, least = Infinity;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use plotters::style::Color as _;
 use serde_json::json;
 
-use super::{Axis, Chart, ChartError, Mark, render};
+use super::{Axis, Chart, ChartError, Mark, Scale, render};
 
 /// Shows the nearest point of each curve; needs nothing from elsewhere.
 const SCRIPT: &str = include_str!("hover.js");
@@ -19,6 +19,8 @@ pub fn page(chart: &Chart) -> Result<String, ChartError> {
         .zip(&frames)
         .filter_map(|(panel, frame)| {
             let frame = frame.as_ref()?;
+            let parts = [frame.x_px.start, frame.x_px.end, frame.y_px.start, frame.y_px.end];
+            let px = parts.map(|parts| f64::from(parts) / f64::from(render::SVG_SCALE));
             let series: Vec<_> = panel
                 .series
                 .iter()
@@ -28,15 +30,16 @@ pub fn page(chart: &Chart) -> Result<String, ChartError> {
                         "name": series.name,
                         "colour": format!("rgb({red},{green},{blue})"),
                         "line": series.mark == Mark::Line,
-                        "points": series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()).collect::<Vec<_>>(),
+                        "points": series.points.iter().filter(|(x, y)| x.is_finite() && panel.scale.height(*y).is_finite()).collect::<Vec<_>>(),
                     })
                 })
                 .collect();
             Some(json!({
                 "x": axis_label(&panel.x),
                 "y": panel.y_label,
-                "nearest": panel.equal_scale,
-                "px": [frame.x_px.start, frame.x_px.end, frame.y_px.start, frame.y_px.end],
+                "nearest": panel.scale == Scale::Equal,
+                "log": panel.scale == Scale::Logarithmic,
+                "px": px,
                 "at": [frame.x.start, frame.x.end, frame.y.start, frame.y.end],
                 "series": series,
             }))

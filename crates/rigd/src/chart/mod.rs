@@ -28,8 +28,8 @@ pub struct Panel {
     pub x: Axis,
     /// Quantity and unit of the vertical axis.
     pub y_label: String,
-    /// The same scale on both axes, as a drawing needs it.
-    pub equal_scale: bool,
+    /// How the axes are divided.
+    pub scale: Scale,
     /// The curves, later ones above earlier ones.
     pub series: Vec<Series>,
 }
@@ -41,6 +41,18 @@ pub enum Axis {
     Turn,
     /// As far as the points reach; quantity and unit.
     Fitted(String),
+}
+
+/// How the axes of a panel are divided.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Scale {
+    /// Each by itself.
+    #[default]
+    Free,
+    /// A unit is as long on both, as a drawing needs it.
+    Equal,
+    /// The vertical one by powers of ten; points at or below 0 are left out.
+    Logarithmic,
 }
 
 /// A curve or a cloud of points.
@@ -65,6 +77,8 @@ pub enum Mark {
     Rings(usize),
     /// Small dots.
     Dots,
+    /// Vertical lines from the axis up to the points.
+    Stems,
 }
 
 /// What a colour stands for, the same in every picture.
@@ -113,7 +127,7 @@ impl Panel {
     /// A panel over one turn of θ1.
     #[must_use]
     pub fn over_turn(title: impl Into<String>, y_label: impl Into<String>, series: Vec<Series>) -> Self {
-        Self { title: title.into(), x: Axis::Turn, y_label: y_label.into(), equal_scale: false, series }
+        Self { title: title.into(), x: Axis::Turn, y_label: y_label.into(), scale: Scale::Free, series }
     }
 }
 
@@ -219,6 +233,31 @@ mod tests {
         let page = String::from_utf8(chart.encode(Format::Html).unwrap()).unwrap();
         assert!(page.starts_with("<!DOCTYPE html>") && page.contains("TE ccw"));
         assert!(!page.contains("http://") || !page.contains("src="), "the page needs nothing else");
+    }
+
+    #[test]
+    fn powers_of_ten_have_no_place_for_zero() {
+        let points = vec![(1.0, 1000.0), (2.0, 0.0), (3.0, 0.01), (4.0, -1.0)];
+        let series = Series { name: "orders".into(), ink: Ink::Ccw, mark: Mark::Stems, points };
+        let panel = Panel {
+            x: Axis::Fitted("order".into()),
+            scale: Scale::Logarithmic,
+            ..Panel::over_turn("Orders", "amplitude / µrad", vec![series])
+        };
+        let chart = Chart { panels: vec![panel] };
+        let page = String::from_utf8(chart.encode(Format::Html).unwrap()).unwrap();
+        assert!(page.contains("\"log\":true") && page.contains("[[1.0,1000.0],[3.0,0.01]]"), "{page}");
+        let svg = chart.svg().unwrap();
+        assert!(svg.contains(">\n1000\n<") && svg.contains(">\n0.01\n<"), "{svg}");
+        // Two stems and what the legend shows of them.
+        assert_eq!(svg.matches("#005AA0").count(), 3, "{svg}");
+    }
+
+    #[test]
+    fn a_drawing_counts_in_parts_of_a_pixel_and_keeps_its_size() {
+        let svg = chart().svg().unwrap();
+        assert!(svg.starts_with("<svg width=\"960\" height=\"640\" viewBox=\"0 0 9600 6400\""), "{}", &svg[..80]);
+        assert!(svg.contains(">\n360\n<"), "the full turn has its label");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::{Axis, Chart, ChartError, Mark, Panel, Series, font};
+use super::{Axis, Chart, ChartError, Mark, Panel, Scale, Series, font};
 
 /// Width of a chart, px.
 const WIDTH_PX: u32 = 960;
@@ -22,6 +22,17 @@ const X_LABELS_PX: u32 = 34;
 const Y_LABELS_PX: u32 = 64;
 const TITLE_PX: u32 = 30;
 
+/// Height of a legend, px: of a line, and around the lines.
+const LEGEND_LINE_PX: u32 = 15;
+const LEGEND_AROUND_PX: u32 = 26;
+/// Lines of a legend that a panel of the usual height holds above its curves.
+const LEGEND_LINES: u32 = 2;
+
+/// Distance of stems at one place, px.
+const STEM_PX: f64 = 1.5;
+
+/// Parts of a pixel in an SVG: plotters rounds places to whole ones, which makes stairs of flat curves.
+pub const SVG_SCALE: u32 = 10;
 /// Pixels of a PNG for each of the sizes above: screens show more than 96 dots an inch.
 const PNG_SCALE: u32 = 2;
 
@@ -40,8 +51,16 @@ pub struct Frame {
 
 /// The chart as SVG and where its panels are; `None` for a panel without points.
 pub fn svg(chart: &Chart) -> Result<(String, Vec<Option<Frame>>), ChartError> {
+    let (width, height) = size_px(chart);
+    let (parts_x, parts_y) = (SVG_SCALE * width, SVG_SCALE * height);
     let mut text = String::new();
-    let frames = draw(chart, SVGBackend::with_string(&mut text, size_px(chart)), 1)?;
+    let frames = draw(chart, SVGBackend::with_string(&mut text, (parts_x, parts_y)), SVG_SCALE)?;
+    // The same picture in pixels: the view box keeps the parts.
+    let text = text.replacen(
+        &format!("width=\"{parts_x}\" height=\"{parts_y}\""),
+        &format!("width=\"{width}\" height=\"{height}\""),
+        1,
+    );
     Ok((text, frames))
 }
 
@@ -63,15 +82,28 @@ fn size_px(chart: &Chart) -> (u32, u32) {
 /// A panel of equal scales is as tall as its points ask for.
 fn height_px(panel: &Panel) -> u32 {
     match bounds(panel) {
-        Some((x, y)) if panel.equal_scale => {
+        Some((x, y)) if panel.scale == Scale::Equal => {
             let width = f64::from(WIDTH_PX - 2 * MARGIN_PX - Y_LABELS_PX);
             let around = f64::from(2 * MARGIN_PX + X_LABELS_PX + TITLE_PX);
             let height = around + width * (y.end - y.start) / (x.end - x.start);
             // The clamp keeps it in the range of u32.
             height.clamp(f64::from(PANEL_PX), f64::from(TALLEST_PX)) as u32
         }
-        _ => PANEL_PX,
+        _ => PANEL_PX + LEGEND_LINE_PX * legend_lines(panel).saturating_sub(LEGEND_LINES),
     }
+}
+
+fn legend_lines(panel: &Panel) -> u32 {
+    // A picture has a handful.
+    panel.series.len() as u32
+}
+
+/// Share of the height of the axes that the legend takes, above the curves.
+fn legend_share(panel: &Panel) -> f64 {
+    let lines = legend_lines(panel);
+    let legend = LEGEND_LINE_PX * lines + LEGEND_AROUND_PX;
+    let height = PANEL_PX + LEGEND_LINE_PX * lines.saturating_sub(LEGEND_LINES);
+    f64::from(legend) / f64::from(height - 2 * MARGIN_PX - X_LABELS_PX - TITLE_PX)
 }
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -96,14 +128,37 @@ where
     panels().map_err(ChartError::Draw)
 }
 
-fn finite(series: &Series) -> impl Iterator<Item = (f64, f64)> {
-    series.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite())
+/// The points where they stand on the axes.
+fn finite(series: &Series, scale: Scale) -> impl Iterator<Item = (f64, f64)> {
+    let placed = series.points.iter().map(move |(x, y)| (*x, scale.height(*y)));
+    placed.filter(|(x, y)| x.is_finite() && y.is_finite())
+}
+
+impl Scale {
+    /// Where a value stands on the vertical axis; not finite where it has no place.
+    pub(super) fn height(self, y: f64) -> f64 {
+        match self {
+            Self::Free | Self::Equal => y,
+            Self::Logarithmic => y.log10(),
+        }
+    }
+
+    /// What stands beside a place on the vertical axis.
+    fn label(self, at: f64, decimals: usize) -> String {
+        match self {
+            Self::Free | Self::Equal => number(at, decimals),
+            // Powers of ten alone: what stands between them is told by the distance.
+            Self::Logarithmic if (at - at.round()).abs() > 1e-6 => String::new(),
+            Self::Logarithmic if at < -3.5 => format!("{:.0e}", 10_f64.powf(at)),
+            Self::Logarithmic => 10_f64.powf(at.round()).to_string(),
+        }
+    }
 }
 
 /// Ranges of the axes with their margins; `None` without points.
 fn bounds(panel: &Panel) -> Option<(Range<f64>, Range<f64>)> {
     let reach = |value: fn((f64, f64)) -> f64| {
-        let values = panel.series.iter().flat_map(finite).map(value);
+        let values = panel.series.iter().flat_map(|series| finite(series, panel.scale)).map(value);
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
     };
     let (low, high) = reach(|(_, y)| y);
@@ -122,9 +177,15 @@ fn bounds(panel: &Panel) -> Option<(Range<f64>, Range<f64>)> {
         Axis::Turn => 0.0,
         Axis::Fitted(_) => margin(left, right, 0.02),
     };
-    // Above the curves: room for the legend.
-    let headroom = if panel.equal_scale { 1.0 } else { 1.0 + panel.series.len() as f64 };
-    Some((left - x_margin..right + x_margin, low - y_margin..high + headroom * y_margin))
+    // Above the curves: room for the legend, share = headroom/(curves + margin + headroom).
+    let headroom = match panel.scale {
+        Scale::Equal => y_margin,
+        Scale::Free | Scale::Logarithmic => {
+            let share = legend_share(panel);
+            share / (1.0 - share) * (high - low + y_margin).max(y_margin)
+        }
+    };
+    Some((left - x_margin..right + x_margin, low - y_margin..high + headroom))
 }
 
 /// Widens one of the ranges so that a unit is as long on both axes.
@@ -137,6 +198,15 @@ fn equalise((x, y): (Range<f64>, Range<f64>), (width, height): (u32, u32), scale
         middle - half..middle + half
     };
     (widen(x, width), widen(y, height))
+}
+
+/// A label; what rounds to 0 has no sign.
+fn number(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(zero) if zero.bytes().all(|byte| matches!(byte, b'0' | b'.')) => zero.to_owned(),
+        _ => text,
+    }
 }
 
 /// Decimals that tell the labels of a range apart.
@@ -152,7 +222,7 @@ where
     let Some(mut ranges) = bounds(panel) else { return Ok(None) };
     // The font reaches above the line that plotters allots to a title.
     let area = area.margin(6 * scale, 0, 0, 0).titled(&panel.title, (font::SANS, 18 * scale))?;
-    if panel.equal_scale {
+    if panel.scale == Scale::Equal {
         ranges = equalise(ranges, area.dim_in_pixel(), scale);
     }
     let (x, y) = ranges;
@@ -160,7 +230,8 @@ where
     builder.margin(scale * MARGIN_PX).x_label_area_size(scale * X_LABELS_PX).y_label_area_size(scale * Y_LABELS_PX);
     let (x_px, y_px) = match &panel.x {
         Axis::Turn => {
-            let mut chart = builder.build_cartesian_2d(x.clone().step(45.0), y.clone())?;
+            // The label of the full turn stands at its very end.
+            let mut chart = builder.build_cartesian_2d((x.start..x.end + 1e-6).step(45.0), y.clone())?;
             fill(&mut chart, panel, "θ1 / °", (0, decimals(&y)), scale)?
         }
         Axis::Fitted(label) => {
@@ -187,6 +258,7 @@ where
     // Plotters takes lengths of marks as i32.
     let px = scale as i32;
     let text = (font::SANS, 12 * scale);
+    let bottom = chart.as_coord_spec().y_spec().range().start;
     chart
         .configure_mesh()
         .label_style(text)
@@ -196,18 +268,34 @@ where
         .x_desc(x_label)
         .y_desc(panel.y_label.as_str())
         .x_labels(9)
-        .x_label_formatter(&|value| format!("{value:.x_decimals$}"))
-        .y_label_formatter(&|value| format!("{value:.y_decimals$}"))
+        .x_label_formatter(&|value| number(*value, x_decimals))
+        .y_label_formatter(&|value| panel.scale.label(*value, y_decimals))
         .light_line_style(TRANSPARENT)
-        .bold_line_style(BLACK.mix(0.12))
+        .bold_line_style(BLACK.mix(0.12).stroke_width(scale))
         .draw()?;
+    // Stems of several series at one place stand side by side.
+    let stems = panel.series.iter().filter(|series| series.mark == Mark::Stems).count() as f64;
+    let x_range = chart.as_coord_spec().x_spec().range();
+    let a_pixel = (x_range.end - x_range.start) / f64::from(chart.plotting_area().dim_in_pixel().0.max(1));
+    let mut aside = -0.5 * (stems - 1.0) * STEM_PX * f64::from(scale) * a_pixel;
     for series in &panel.series {
         let colour = series.ink.colour();
         let (every, size, style) = match series.mark {
             Mark::Line => {
                 let style = colour.stroke_width(scale);
                 chart
-                    .draw_series(LineSeries::new(finite(series), style))?
+                    .draw_series(LineSeries::new(finite(series, panel.scale), style))?
+                    .label(series.name.as_str())
+                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 20 * px, y)], style));
+                continue;
+            }
+            Mark::Stems => {
+                let style = colour.stroke_width(scale);
+                let shift = aside;
+                aside += STEM_PX * f64::from(scale) * a_pixel;
+                let stem = |(x, y): (f64, f64)| PathElement::new([(x + shift, bottom), (x + shift, y)], style);
+                chart
+                    .draw_series(finite(series, panel.scale).map(stem))?
                     .label(series.name.as_str())
                     .legend(move |(x, y)| PathElement::new([(x, y), (x + 20 * px, y)], style));
                 continue;
@@ -216,7 +304,7 @@ where
             Mark::Dots => (1, px, colour.filled()),
         };
         chart
-            .draw_series(finite(series).step_by(every).map(|point| Circle::new(point, size, style)))?
+            .draw_series(finite(series, panel.scale).step_by(every).map(|point| Circle::new(point, size, style)))?
             .label(series.name.as_str())
             .legend(move |(x, y)| Circle::new((x + 10 * px, y), 3 * px, style));
     }
@@ -227,7 +315,7 @@ where
         .legend_area_size(30 * px)
         .margin(10 * scale)
         .background_style(WHITE.mix(0.8))
-        .border_style(BLACK.mix(0.2))
+        .border_style(BLACK.mix(0.2).stroke_width(scale))
         .draw()?;
     Ok(chart.plotting_area().get_pixel_range())
 }

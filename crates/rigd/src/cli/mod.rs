@@ -1,5 +1,6 @@
 //! The command line. One command is one file; here they are only routed.
 
+mod analyse;
 mod directions;
 mod import;
 mod info;
@@ -53,6 +54,8 @@ enum Command {
     Run(Box<run::Args>),
     /// Recompute TE and backlash from logs
     Replay(replay::Args),
+    /// Order spectra, long and short waves, averages and noise floor of logs
+    Analyse(analyse::Args),
     /// Say what is in a log
     Info(info::Args),
     /// Make a log from a table of angles (CSV, Parquet)
@@ -80,6 +83,7 @@ pub fn main() -> ExitCode {
     let exit = match Cli::parse().command {
         Command::Run(args) => run::main(&args),
         Command::Replay(args) => replay::main(&args),
+        Command::Analyse(args) => analyse::main(&args),
         Command::Info(args) => info::main(&args),
         Command::Import(args) => import::main(&args),
         Command::Model(args) => model::main(&args),

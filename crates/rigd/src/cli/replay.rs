@@ -1,11 +1,10 @@
 //! `rigd replay`: recompute TE and backlash from logs.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::{Exit, fail, print};
 use crate::analysis::Analysis;
-use crate::pair;
-use crate::replay::{self, ReplayError};
+use crate::replay;
 use crate::summary::{Origin, Summary};
 
 /// Recompute TE and backlash from logs.
@@ -47,16 +46,7 @@ pub fn main(args: &Args) -> Exit {
 }
 
 fn run(args: &Args) -> Result<Exit, Box<dyn std::error::Error>> {
-    let first = &args.logs[0];
-    let (pair_in_log, backend) = replay::head(first).map_err(ReplayError::Log)?;
-    let model = match &args.pair {
-        Some(path) => pair::load(Some(path))?.1,
-        None => {
-            let text = pair_in_log.ok_or_else(|| ReplayError::NoPair { path: first.clone() })?;
-            pair::parse(&text, Path::new("pair.toml"))
-                .map_err(|source| ReplayError::Pair { path: first.clone(), source })?
-        }
-    };
+    let (model, backend) = replay::model_for(&args.logs[0], args.pair.as_deref())?;
     let mut analysis = Analysis::new(model);
     let mut replayed = replay::replay(&args.logs, &mut analysis, args.speed.0)?;
     if analysis.runs().is_empty() {

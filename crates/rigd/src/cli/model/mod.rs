@@ -6,7 +6,7 @@ mod curve;
 mod error;
 mod method;
 mod outline;
-mod output;
+pub(super) mod output;
 mod parameter;
 #[cfg(feature = "parquet")]
 mod parquet;
@@ -14,7 +14,7 @@ mod phases;
 mod progress;
 mod source;
 mod sweep;
-mod table;
+pub(super) mod table;
 mod te;
 mod tolerance;
 

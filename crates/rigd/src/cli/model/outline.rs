@@ -9,7 +9,7 @@ use super::error::{ModelError, check_count};
 use super::output::{Extra, Output, OutputError, Report};
 use super::source::Source;
 use super::table::{Column, Table};
-use crate::chart::{Axis, Chart, Ink, Mark, Panel, Series};
+use crate::chart::{Axis, Chart, Ink, Mark, Panel, Scale, Series};
 use crate::quantity::ANGLE;
 
 /// The gears as drawings.
@@ -146,7 +146,7 @@ pub fn run(args: &Args) -> Result<(), ModelError> {
         title: format!("In mesh at θ1 = {:.2}°", theta1_rad.to_degrees()),
         x: Axis::Fitted("x / mm".into()),
         y_label: "y / mm".into(),
-        equal_scale: true,
+        scale: Scale::Equal,
         series,
     };
     Ok(args.output.deliver(Report { text, json, table, chart: Chart { panels: vec![panel] } }, &extras)?)

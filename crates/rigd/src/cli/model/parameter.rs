@@ -2,6 +2,8 @@
 
 use gearmodel::sensitivity::Parameter;
 
+use crate::quantity::tidy;
+
 /// Most values that a range may expand to.
 const MAX_VALUES: usize = 1_000_000;
 
@@ -36,7 +38,7 @@ pub fn axis(text: &str) -> Result<(Parameter, Vec<f64>), String> {
             if step <= 0.0 || last < first || steps >= MAX_VALUES as f64 {
                 return Err(format!("'{text}' needs FIRST <= LAST, STEP > 0 and at most {MAX_VALUES} values; {form}"));
             }
-            (0..=steps as usize).map(|n| first + n as f64 * step).collect()
+            (0..=steps as usize).map(|n| tidy(first + n as f64 * step)).collect()
         }
     };
     Ok((parameter, values))
@@ -62,7 +64,7 @@ mod tests {
     fn axes_are_lists_or_ranges() {
         let (parameter, values) = axis("e1_mm=0..0.1:0.02").unwrap();
         assert_eq!((parameter, values.len()), (Parameter::E1Mm, 6));
-        assert!((values[5] - 0.1).abs() < 1e-12);
+        assert_eq!(values, [0.0, 0.02, 0.04, 0.06, 0.08, 0.1]);
         assert_eq!(axis("eccentricity=0.2, 0.4").unwrap().1, [0.2, 0.4]);
         for wrong in ["e1_mm", "e1_mm=", "e1_mm=0..1", "e1_mm=1..0:0.1", "e1_mm=0..1:0", "e1_mm=nan", "e1_mm=0..1e9:1"]
         {

@@ -10,7 +10,7 @@ use super::error::ModelError;
 use super::output::{Output, Report};
 use super::source::Source;
 use super::table::{Column, Table};
-use crate::chart::{Axis, Chart, Ink, Mark, Panel, Series};
+use crate::chart::{Axis, Chart, Ink, Mark, Panel, Scale, Series};
 use crate::present::angle;
 
 /// How to mount the gears so that their eccentricities disturb least.
@@ -166,7 +166,7 @@ pub fn run(args: &Args) -> Result<(), ModelError> {
         title: format!("Peak-to-peak of {name} about the best mounting"),
         x: Axis::Fitted("phase / °".into()),
         y_label: "peak-to-peak / µrad".into(),
-        equal_scale: false,
+        scale: Scale::Free,
         series,
     };
     Ok(args.output.deliver(Report { text, json, table, chart: Chart { panels: vec![panel] } }, &[])?)

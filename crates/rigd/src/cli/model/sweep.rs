@@ -13,7 +13,7 @@ use super::parameter::axis;
 use super::progress::Progress;
 use super::source::Source;
 use super::table::{Column, Table};
-use crate::chart::{Axis, Chart, Ink, Mark, Panel, Series};
+use crate::chart::{Axis, Chart, Ink, Mark, Panel, Scale, Series};
 use crate::cli::Exit;
 use crate::present::arcsec;
 use crate::quantity::TORQUE;
@@ -244,7 +244,7 @@ fn panel(over: &[(Parameter, Vec<f64>)], of: Of, table: &SweepTable) -> Panel {
         title: format!("{} over {}", of.name(), last.name()),
         x: Axis::Fitted(last.name().into()),
         y_label: format!("{} / µrad", of.name()),
-        equal_scale: false,
+        scale: Scale::Free,
         series,
     }
 }

@@ -10,7 +10,7 @@ use super::parameter::width;
 use super::progress::Progress;
 use super::source::Source;
 use super::table::{Column, Table};
-use crate::chart::{Axis, Chart, Ink, Mark, Panel, Series};
+use crate::chart::{Axis, Chart, Ink, Mark, Panel, Scale, Series};
 use crate::present::{angle, arcsec};
 use crate::quantity::TORQUE;
 
@@ -158,7 +158,7 @@ fn chart(figures: &[ToleranceFigure]) -> Chart {
         title: "Share of the pairs that stay below".into(),
         x: Axis::Fitted("figure / µrad".into()),
         y_label: "pairs / %".into(),
-        equal_scale: false,
+        scale: Scale::Free,
         series,
     };
     Chart { panels: vec![panel] }
