@@ -9,6 +9,7 @@ mod run;
 mod sim;
 mod simulator;
 mod stop;
+mod withhold;
 
 use std::process::ExitCode;
 

@@ -76,6 +76,7 @@ pub struct Plant {
     input: Encoder,
     output: Encoder,
     run_out: RunOut,
+    slow_run_out: Option<RunOut>,
     creep: Option<Creep>,
     count_loss: Option<CountLoss>,
     count_losses: u64,
@@ -122,7 +123,11 @@ impl Plant {
             brake: Brake::new(&spec.brake, stream(seed, 2)),
             input: Encoder::new(&spec.encoders.input, chain.q[INPUT], stream(seed, 3)),
             output: Encoder::new(&spec.encoders.output, chain.q[DISC], stream(seed, 4)),
-            run_out: RunOut::new(&spec.noise, stream(seed, 5)),
+            run_out: RunOut::new(spec.noise.run_out_rms_mm, spec.noise.run_out_correlation_rev, stream(seed, 5)),
+            slow_run_out: (spec.noise.slow_run_out_rms_mm != 0.0).then(|| {
+                let noise = &spec.noise;
+                RunOut::new(noise.slow_run_out_rms_mm, noise.slow_run_out_correlation_rev, stream(seed, 8))
+            }),
             creep: Creep::new(&spec.clamp, stream(seed, 6)),
             count_loss: CountLoss::new(loss.counts, loss.losses_per_rev, stream(seed, 7)),
             count_losses: 0,
@@ -227,7 +232,8 @@ impl Plant {
             seal_nm_s_per_rad,
             brake_capacity_nm: self.brake.capacity_nm(self.chain.v[ROTOR], self.chain.q[ROTOR]),
             clamp_slip_rad: self.clamp_slip_rad,
-            run_out_mm: self.run_out.advance(travel_rad),
+            run_out_mm: self.run_out.advance(travel_rad)
+                + self.slow_run_out.as_mut().map_or(0.0, |slow| slow.advance(travel_rad)),
         };
         self.chain.step(h, &drive, &self.mesh);
         self.brake.heat(self.chain.brake_torque_nm, self.chain.v[ROTOR]);

@@ -147,6 +147,7 @@ impl PlantSpec {
         self.encoders.input.noise_rad = 0.0;
         self.encoders.output.noise_rad = 0.0;
         self.noise.run_out_rms_mm = 0.0;
+        self.noise.slow_run_out_rms_mm = 0.0;
         self.brake.stick_slip_ratio = 0.0;
         self.drive.ripple.clear();
         self
