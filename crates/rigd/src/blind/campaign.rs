@@ -195,12 +195,7 @@ impl Driver<'_> {
     }
 
     /// Samples until `done`; an error after `patience_s`.
-    fn until(
-        &mut self,
-        what: &'static str,
-        patience_s: f64,
-        done: impl Fn(&Plant) -> bool,
-    ) -> Result<(), BlindError> {
+    fn until(&mut self, what: &'static str, patience_s: f64, done: impl Fn(&Plant) -> bool) -> Result<(), BlindError> {
         let samples = (patience_s * self.plan.rate_hz).ceil() as usize;
         for _ in 0..samples {
             self.sample();
@@ -250,9 +245,7 @@ impl Driver<'_> {
     fn travel(&mut self, angle_rad: f64, speed_rpm: f64) -> Result<(), BlindError> {
         let from = self.plant.truth().angles_rad[0];
         let patience_s = 2.0 + 1.2 * angle_rad / TAU * 60.0 / speed_rpm;
-        self.until("the driver to turn", patience_s, |plant| {
-            (plant.truth().angles_rad[0] - from).abs() >= angle_rad
-        })
+        self.until("the driver to turn", patience_s, |plant| (plant.truth().angles_rad[0] - from).abs() >= angle_rad)
     }
 
     fn record(&mut self, run: RunPlan) -> Result<(), BlindError> {
@@ -299,6 +292,30 @@ mod tests {
         let [theta1, theta2] = campaign.angles_rad(span.from + 100);
         assert!((theta2 - plant.nominal_driven_rad(theta1)).abs() < 0.01);
         assert!(campaign.states.iter().any(|state| state.phase == Phase::Record && state.sample == span.from));
+    }
+
+    #[test]
+    fn a_sound_rig_is_what_its_nominal_model_says() {
+        let (_, model) = crate::pair::load(None).unwrap();
+        let spec = crate::sim::spec(&model, &[]).unwrap().quiet();
+        let mut plan = CampaignPlan::usual(250.0);
+        plan.revolutions = 1.0;
+        let campaign = run(&spec, &plan, 3).unwrap();
+        for span in &campaign.runs {
+            let misses: Vec<f64> = (span.from..span.to)
+                .map(|sample| {
+                    let [theta1, theta2] = campaign.angles_rad(sample);
+                    let te = theta2 - model.pair.theta2(theta1);
+                    te - model.te_rad(theta1, span.plan.direction, span.plan.load_nm)
+                })
+                .collect();
+            let count = misses.len() as f64;
+            let mean = misses.iter().sum::<f64>() / count;
+            let rms = (misses.iter().map(|miss| (miss - mean).powi(2)).sum::<f64>() / count).sqrt();
+            // Counting steps of both encoders leave 0.4 µrad; then the load's inertia and what is second order.
+            assert!(rms < 1e-6, "{:?}: {rms}", span.plan);
+            assert!(mean.abs() < 2e-6, "{:?}: {mean}", span.plan);
+        }
     }
 
     #[test]

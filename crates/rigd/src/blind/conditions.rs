@@ -43,9 +43,7 @@ impl Conditions {
         let white_rad = (floor_rad.powi(2) - run_out_rad.powi(2) - slow_run_out_rad.powi(2)).sqrt();
         let usable: Vec<u32> = LINES
             .into_iter()
-            .filter(|lines| {
-                interpolation_rad.is_none_or(|rms| 2f64.sqrt() * rms * f64::from(*lines) < LARGEST_OFFSET)
-            })
+            .filter(|lines| interpolation_rad.is_none_or(|rms| 2f64.sqrt() * rms * f64::from(*lines) < LARGEST_OFFSET))
             .collect();
         let lines = usable.get(dice.below(usable.len())).copied().unwrap_or(2_500);
         // Some rigs have soft gears, and their drawing says so.
@@ -87,8 +85,7 @@ mod tests {
         let mut dice = Dice::new(2);
         for _ in 0..500 {
             let drawn = Conditions::draw(&mut dice, 1.7e-3, Some(3e-5), Some(3e-5));
-            let floor =
-                (drawn.white_rad.powi(2) + drawn.run_out_rad.powi(2) + drawn.slow_run_out_rad.powi(2)).sqrt();
+            let floor = (drawn.white_rad.powi(2) + drawn.run_out_rad.powi(2) + drawn.slow_run_out_rad.powi(2)).sqrt();
             assert!((8e-6..=25.001e-6).contains(&floor), "{floor}");
             assert!(drawn.mesh_compliance_mm2_rad_per_nm >= 0.024);
             let mut spec = PlantSpec::default();

@@ -1,5 +1,8 @@
 //! Draws the faults of a case and makes its rig: which effects, in which place, at which size.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use serde::{Deserialize, Serialize};
 
 use super::BlindError;
@@ -72,12 +75,33 @@ pub struct Case {
     pub label: Label,
 }
 
+/// Sound rigs that were measured before, by the documented compliance of their mesh: most cases share one.
+pub type Baselines = Mutex<HashMap<u64, Arc<Baseline>>>;
+
+/// The sound rig of a case, measured once.
+fn baseline_of(known: &Baselines, sound: &PlantSpec, plan: &CampaignPlan) -> Result<Arc<Baseline>, BlindError> {
+    let key = sound.mesh.compliance_mm2_rad_per_nm.to_bits();
+    let found = known.lock().unwrap_or_else(PoisonError::into_inner).get(&key).map(Arc::clone);
+    if let Some(baseline) = found {
+        return Ok(baseline);
+    }
+    let baseline = Arc::new(Baseline::measure(sound, plan)?);
+    known.lock().unwrap_or_else(PoisonError::into_inner).insert(key, Arc::clone(&baseline));
+    Ok(baseline)
+}
+
 /// Makes case `number` of the set `seed`: `family` and how many of that family came before it are those of
 /// [`super::family::of_case`].
 ///
 /// # Errors
 /// [`BlindError`] for a pair without simulated gears, and for an effect that no rig can have at its size.
-pub fn make(seed: u64, number: usize, (family, before): (Family, usize), pair_toml: &str) -> Result<Case, BlindError> {
+pub fn make(
+    seed: u64,
+    number: usize,
+    (family, before): (Family, usize),
+    pair_toml: &str,
+    baselines: &Baselines,
+) -> Result<Case, BlindError> {
     // Seeds of neighbouring cases share nothing.
     let mut dice = Dice::new(seed ^ (number as u64 + 1).wrapping_mul(0xD134_2543_DE82_EF95));
     let chosen = choose(&mut dice, family, before);
@@ -100,16 +124,17 @@ pub fn make(seed: u64, number: usize, (family, before): (Family, usize), pair_to
     let mut effects = Vec::new();
     let mut rms_rad = 0.0;
     if !chosen.is_empty() {
-        let baseline = Baseline::measure(&sound, &plan, conditions.seed)?;
+        let baseline = baseline_of(baselines, &sound, &plan)?;
+        let sizing = Sizing { sound: &sound, baseline: &baseline, plan: &plan, seed: conditions.seed };
         for (effect, wanted_rad) in &chosen {
-            let (parameters, size_rad) = fit(effect, *wanted_rad, &sound, &baseline, &mut dice)?;
+            let (parameters, size_rad) = fit(effect, *wanted_rad, &sizing, &mut dice)?;
             (effect.apply)(&mut spec, &parameters);
             let outside = OUTSIDE.iter().any(|other| other.name == effect.name);
             effects.push(LabelledEffect { name: effect.name.into(), outside, parameters, rms_rad: size_rad });
         }
         rms_rad = match effects.as_slice() {
             [only] => only.rms_rad,
-            _ => baseline.rms_rad(&spec)?.0,
+            _ => sizing.rms_rad(&spec, chosen.iter().any(|(effect, _)| effect.develops))?,
         };
     }
     let campaign = campaign::run(&spec, &plan, conditions.seed)?;
@@ -169,8 +194,7 @@ fn choose(dice: &mut Dice, family: Family, before: usize) -> Vec<(&'static Undoc
         }
         chosen
     };
-    let unknown =
-        |dice: &mut Dice| (&OUTSIDE[before % OUTSIDE.len()], dice.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1));
+    let unknown = |dice: &mut Dice| (&OUTSIDE[before % OUTSIDE.len()], dice.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1));
     match family {
         Family::Null => Vec::new(),
         Family::Single => {
@@ -192,12 +216,26 @@ fn choose(dice: &mut Dice, family: Family, before: usize) -> Vec<(&'static Undoc
     }
 }
 
+/// How sizes are measured in a case.
+struct Sizing<'a> {
+    sound: &'a PlantSpec,
+    baseline: &'a Baseline,
+    plan: &'a CampaignPlan,
+    seed: u64,
+}
+
+impl Sizing<'_> {
+    /// What every revolution repeats is measured over one of them.
+    fn rms_rad(&self, spec: &PlantSpec, develops: bool) -> Result<f64, BlindError> {
+        self.baseline.rms_rad(spec, if develops { self.plan.revolutions } else { 1.0 }, self.seed)
+    }
+}
+
 /// Draws an effect and scales it to the size wanted; an effect that cannot be as large is as large as it can be.
 fn fit(
     effect: &Undocumented,
     wanted_rad: f64,
-    sound: &PlantSpec,
-    baseline: &Baseline,
+    sizing: &Sizing<'_>,
     dice: &mut Dice,
 ) -> Result<(Parameters, f64), BlindError> {
     /// Fresh draws, where one shows nothing.
@@ -207,17 +245,17 @@ fn fit(
     /// Steps back from what cannot be built.
     const STEPS_BACK: usize = 40;
     for _ in 0..DRAWS {
-        let mut parameters = (effect.draw)(sound, dice);
+        let mut parameters = (effect.draw)(sizing.sound, dice);
         let mut best = None;
         let mut limited = false;
         for _ in 0..CORRECTIONS {
             let mut measured = None;
             for _ in 0..STEPS_BACK {
                 parameters = settled(effect, parameters);
-                let mut spec = sound.clone();
+                let mut spec = sizing.sound.clone();
                 (effect.apply)(&mut spec, &parameters);
-                match baseline.rms_rad(&spec) {
-                    Ok((rms_rad, _)) => {
+                match sizing.rms_rad(&spec, effect.develops) {
+                    Ok(rms_rad) => {
                         measured = Some(rms_rad);
                         break;
                     }
@@ -261,10 +299,7 @@ fn settled(effect: &Undocumented, parameters: Parameters) -> Parameters {
 fn document(pair_toml: &str, mesh_compliance_mm2_rad_per_nm: f64) -> String {
     let Ok(mut table) = pair_toml.parse::<toml::Table>() else { return pair_toml.to_owned() };
     if let Some(toml::Value::Table(documented)) = table.get_mut("documented") {
-        documented.insert(
-            "mesh_compliance_mm2_rad_per_nm".into(),
-            toml::Value::Float(mesh_compliance_mm2_rad_per_nm),
-        );
+        documented.insert("mesh_compliance_mm2_rad_per_nm".into(), toml::Value::Float(mesh_compliance_mm2_rad_per_nm));
     }
     toml::to_string(&table).unwrap_or_else(|_| pair_toml.to_owned())
 }
@@ -297,12 +332,13 @@ mod tests {
     #[test]
     fn a_drawn_effect_has_its_size_and_the_same_seed_draws_the_same() {
         let (pair_toml, _) = pair::load(None).unwrap();
-        let case = make(5, 9, (Family::Single, 9), &pair_toml).unwrap();
+        let known = Baselines::default();
+        let case = make(5, 9, (Family::Single, 9), &pair_toml, &known).unwrap();
         let effect = &case.label.effects[0];
         let wanted = SINGLE_SIZES_RAD[9 % 4];
         assert!((effect.rms_rad / wanted - 1.0).abs() < 2.0 * TOLERANCE, "{} {}", effect.name, effect.rms_rad);
-        let again = make(5, 9, (Family::Single, 9), &pair_toml).unwrap();
+        let again = make(5, 9, (Family::Single, 9), &pair_toml, &known).unwrap();
         assert!(again.label == case.label && again.campaign == case.campaign);
-        assert_ne!(make(6, 9, of_case(9, Some(Family::Single)), &pair_toml).unwrap().label, case.label);
+        assert_ne!(make(6, 9, of_case(9, Some(Family::Single)), &pair_toml, &known).unwrap().label, case.label);
     }
 }

@@ -8,8 +8,9 @@
 //! | driving the rig | `campaign` |
 //! | the log without a trace of the draw | `log` |
 //! | the label, sealed by a salted hash | `seal` |
+//! | cases as files | `set` |
 //! | asking the diagnosis | `ask` |
-//! | one answer against its label | `verdict` |
+//! | one answer against its label | `verdict`, `signature` |
 //! | many answers: rates, calibration, power, coverage | `score`, `calibration` |
 //! | the report | `report`, `page` |
 
@@ -22,14 +23,21 @@ use crate::pair::PairError;
 use crate::sim::SimError;
 use crate::sim::plant::PlantError;
 
+pub mod ask;
+pub mod calibration;
 pub mod campaign;
 mod conditions;
 pub mod draw;
 pub mod family;
 pub mod log;
+pub mod page;
+pub mod report;
+pub mod score;
 pub mod seal;
 pub mod set;
+mod signature;
 pub mod size;
+pub mod verdict;
 
 /// Why there is no withheld data, or no score.
 #[derive(Debug, Error)]
@@ -52,7 +60,9 @@ pub enum BlindError {
         where_: &'static str,
     },
     /// The simulated rig does not get there.
-    #[error("withheld case: waited {patience_s:.1} s of simulated time for {what}; the plan's speed or load stalls the rig")]
+    #[error(
+        "withheld case: waited {patience_s:.1} s of simulated time for {what}; the plan's speed or load stalls the rig"
+    )]
     Stuck {
         /// What was waited for.
         what: &'static str,

@@ -2,13 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::draw;
+use super::draw::{self, Baselines};
 use super::family::{Family, of_case};
 use super::seal::Sealed;
 use super::{BlindError, log};
 
 /// What set is made.
-#[derive(Debug, Clone)]
 pub struct SetPlan {
     /// Seed of all draws.
     pub seed: u64,
@@ -16,6 +15,8 @@ pub struct SetPlan {
     pub family: Option<Family>,
     /// The nominal pair.
     pub pair_toml: String,
+    /// What was measured for earlier cases.
+    pub baselines: Baselines,
 }
 
 impl SetPlan {
@@ -24,7 +25,7 @@ impl SetPlan {
     /// # Errors
     /// [`BlindError`] for a case that cannot be drawn or written.
     pub fn make(&self, directory: &Path, number: usize) -> Result<PathBuf, BlindError> {
-        let case = draw::make(self.seed, number, of_case(number, self.family), &self.pair_toml)?;
+        let case = draw::make(self.seed, number, of_case(number, self.family), &self.pair_toml, &self.baselines)?;
         let sealed = Sealed::new(&case.label);
         let path = log::path(directory, number);
         log::write(&path, &case.campaign, &case.pair_toml, &sealed.hash())?;

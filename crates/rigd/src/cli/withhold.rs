@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use super::{Exit, fail, print};
+use crate::blind::draw::Baselines;
 use crate::blind::family::Family;
 use crate::blind::set::SetPlan;
 use crate::pair;
@@ -36,7 +37,7 @@ pub fn main(args: &Args, seed: u64, pair: Option<&std::path::Path>) -> Exit {
         eprintln!("error: --out {}: {error}; name a directory that you may write", out.display());
         return Exit::BadInput;
     }
-    let plan = SetPlan { seed, family: args.family, pair_toml };
+    let plan = SetPlan { seed, family: args.family, pair_toml, baselines: Baselines::default() };
     for number in 0..args.cases as usize {
         let started = Instant::now();
         match plan.make(out, number) {

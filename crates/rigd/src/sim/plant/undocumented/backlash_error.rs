@@ -9,6 +9,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("dj_mm", 1.0)],
+    develops: false,
     apply,
 };
 

@@ -9,6 +9,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("counts", 1.0)],
+    develops: true,
     apply,
 };
 

@@ -10,6 +10,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("beta_rad", 0.5)],
+    develops: false,
     apply,
 };
 

@@ -9,6 +9,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("eps", 1.0)],
+    develops: false,
     apply,
 };
 

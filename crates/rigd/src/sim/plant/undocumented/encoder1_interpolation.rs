@@ -9,6 +9,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("a_rad", 1.0)],
+    develops: false,
     apply,
 };
 

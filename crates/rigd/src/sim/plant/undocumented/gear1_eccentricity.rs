@@ -9,6 +9,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("dx_mm", 1.0), ("dy_mm", 1.0)],
+    develops: false,
     apply,
 };
 

@@ -10,6 +10,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("c_mm2_rad_per_nm", 1.0)],
+    develops: false,
     apply,
 };
 

@@ -59,6 +59,8 @@ pub struct Undocumented {
     pub draw: fn(&PlantSpec, &mut Dice) -> Parameters,
     /// The parameters that carry its size, and the power of the size with which each goes.
     pub amounts: &'static [(&'static str, f64)],
+    /// Whether what it adds changes from revolution to revolution.
+    pub develops: bool,
     /// Puts it into a plant.
     pub apply: fn(&mut PlantSpec, &Parameters),
 }

@@ -9,6 +9,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("ccw_mm", 1.0), ("cw_mm", 1.0)],
+    develops: false,
     apply,
 };
 

@@ -11,6 +11,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("a1_mm", 1.0), ("a2_mm", 1.0), ("a3_mm", 1.0)],
+    develops: false,
     apply,
 };
 

@@ -9,6 +9,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("c_rad_per_nm", 1.0)],
+    develops: false,
     apply,
 };
 

@@ -10,6 +10,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("k_rad_per_rev_nm", 1.0)],
+    develops: true,
     apply,
 };
 

@@ -11,6 +11,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("depth_mm", 1.0)],
+    develops: false,
     apply,
 };
 

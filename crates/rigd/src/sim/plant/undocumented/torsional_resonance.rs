@@ -10,6 +10,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("f_hz", -0.5)],
+    develops: false,
     apply,
 };
 

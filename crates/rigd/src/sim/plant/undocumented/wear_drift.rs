@@ -9,6 +9,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("dj_mm_per_rev_nm", 1.0)],
+    develops: true,
     apply,
 };
 

@@ -10,6 +10,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("a_rad", 1.0)],
+    develops: true,
     apply,
 };
 

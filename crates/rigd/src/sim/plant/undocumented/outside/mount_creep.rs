@@ -10,6 +10,7 @@ pub const EFFECT: Undocumented = Undocumented {
     usual,
     draw,
     amounts: &[("rad_per_s", 1.0)],
+    develops: true,
     apply,
 };
 
