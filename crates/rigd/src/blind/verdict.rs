@@ -259,8 +259,10 @@ pub(super) mod tests {
                     "dj_mm": {"value": 0.03, "std": 1e-3, "unit": "mm"}}})
             })
             .collect();
-        json!({"verdict": verdict, "effects": effects, "groups": [], "unknown": {"probability": unknown},
-               "gap": {"before_rad": 5e-5, "after_rad": 3e-5, "floor_rad": 3e-5}})
+        let mut said = json!({"effects": effects, "groups": [], "unknown": {"probability": unknown},
+               "gap": {"before_rad": 5e-5, "after_rad": 3e-5, "floor_rad": 3e-5}});
+        said["verdict"] = verdict;
+        said
     }
 
     #[test]
