@@ -27,6 +27,8 @@ pub mod ask;
 pub mod calibration;
 pub mod campaign;
 mod conditions;
+#[cfg(test)]
+mod convention_tests;
 pub mod draw;
 pub mod family;
 pub mod log;

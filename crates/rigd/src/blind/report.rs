@@ -23,7 +23,7 @@ fn line(figure: &Figure) -> String {
         Some(false) => "MISSED",
         _ => "",
     };
-    format!("{:<62} {:>8}  {:<22} {mark}", figure.name, value(figure), counts(figure)).trim_end().to_owned()
+    format!("{:<62} {:>8}  {:<26} {mark}", figure.name, value(figure), counts(figure)).trim_end().to_owned()
 }
 
 /// The value: a share in percent, a number as it is.
@@ -47,8 +47,10 @@ pub fn counts(figure: &Figure) -> String {
         (None, None) => String::new(),
     };
     match figure.rate {
-        Some(rate) => format!("{} of {}  {aim}", rate.hits, rate.of),
-        None => aim,
+        Some(rate) if aim.is_empty() => format!("{} of {}", rate.hits, rate.of),
+        Some(rate) => format!("{} of {}, aim {aim}", rate.hits, rate.of),
+        None if aim.is_empty() => aim,
+        None => format!("aim {aim}"),
     }
 }
 
@@ -61,7 +63,7 @@ mod tests {
     fn every_figure_with_a_value_has_its_line() {
         let text = text(&set());
         assert!(text.starts_with("7 cases, 1 without an answer"));
-        assert!(text.contains("1 of 2  ≤ 3 %") && text.contains("MISSED"), "{text}");
+        assert!(text.contains("1 of 2, aim ≤ 3 %") && text.contains("MISSED"), "{text}");
         assert!(!text.contains("two effects"));
         assert!(text.ends_with("case 6: no answer"));
     }

@@ -13,6 +13,9 @@ const POWER_EDGES: [f64; 8] = [0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0];
 /// Effects under this size are not asked for their probability, rad RMS.
 const CLEAR_RAD: f64 = 9.5e-6;
 
+/// What stands behind an effect's name where the diagnosis had to do without it.
+pub const LEFT_OUT: &str = " (left out)";
+
 /// How many of how many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Rate {
@@ -112,16 +115,20 @@ pub struct Score {
 }
 
 impl Score {
-    /// Of judged cases and those without an answer, which count as wrong.
+    /// Of judged cases, those without an answer among them, which count as wrong; `failed` could not even be asked.
     #[must_use]
-    pub fn of(outcomes: Vec<Outcome>, failed: Vec<(usize, String)>) -> Self {
+    pub fn of(outcomes: Vec<Outcome>, mut failed: Vec<(usize, String)>) -> Self {
+        let cases = outcomes.len() + failed.len();
+        failed.extend(outcomes.iter().filter_map(|case| Some((case.case, case.no_answer.clone()?))));
+        failed.sort();
         let calibration = Calibration::of(&outcomes.iter().flat_map(|case| case.events.clone()).collect::<Vec<_>>());
         let coverage = coverage(&outcomes);
-        let times: Vec<f64> = outcomes.iter().map(|case| case.seconds).collect();
-        let mean_s = times.iter().sum::<f64>() / times.len().max(1) as f64;
+        let answered = outcomes.iter().filter(|case| case.no_answer.is_none());
+        let times: Vec<f64> = answered.map(|case| case.seconds).collect();
+        let mean_s = times.iter().fold(0.0, |sum, time| sum + time) / times.len().max(1) as f64;
         Self {
             schema: "rigd.blindtest/1",
-            cases: outcomes.len() + failed.len(),
+            cases,
             figures: figures(&outcomes, &calibration, &coverage),
             by_effect: by_effect(&outcomes),
             by_outside: by_outside(&outcomes),
@@ -249,11 +256,12 @@ fn confusion(outcomes: &[Outcome]) -> BTreeMap<String, BTreeMap<String, usize>> 
                 count(name, said);
             }
         }
-        for name in &case.hidden {
+        let hidden: Vec<String> = case.hidden.iter().map(|name| hidden_name(case.family, name)).collect();
+        for name in &hidden {
             count(name, if case.says_unknown { "unknown" } else { "nothing" });
         }
         if missed.is_empty() {
-            let owner = case.hidden.first().map_or("nothing", String::as_str);
+            let owner = hidden.first().map_or("nothing", String::as_str);
             for said in &case.false_names {
                 count(owner, said);
             }
@@ -263,6 +271,11 @@ fn confusion(outcomes: &[Outcome]) -> BTreeMap<String, BTreeMap<String, usize>> 
         }
     }
     matrix
+}
+
+/// A hidden effect's row: one that the diagnosis knows but had to do without is a row of its own.
+fn hidden_name(family: Family, name: &str) -> String {
+    if family == Family::LeftOut { format!("{name}{LEFT_OUT}") } else { name.to_owned() }
 }
 
 fn power(outcomes: &[Outcome]) -> Vec<Power> {

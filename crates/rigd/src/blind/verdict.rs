@@ -78,6 +78,16 @@ pub struct Outcome {
     pub rms_rad: f64,
     /// Time for the diagnosis, s.
     pub seconds: f64,
+    /// Why there is no answer.
+    pub no_answer: Option<String>,
+}
+
+impl Outcome {
+    /// A case that the diagnosis did not answer: nothing is named, and nothing is right, not even a null.
+    #[must_use]
+    pub fn unanswered(label: &Label, reason: String) -> Self {
+        Self { exact: false, no_answer: Some(reason), ..judge(label, &Value::Null, 0.0) }
+    }
 }
 
 /// Judges an answer (`to_dict()` of the diagnosis). Fields that are missing count as not said.
@@ -146,6 +156,7 @@ pub fn judge(label: &Label, answer: &Value, seconds: f64) -> Outcome {
         signature,
         rms_rad: label.rms_rad,
         seconds,
+        no_answer: None,
     }
 }
 
@@ -323,6 +334,12 @@ pub(super) mod tests {
         assert!((judged.truths[0].standard_errors.unwrap() - 20.0).abs() < 1e-9);
         // 5² − 3² = 16 of (30 µrad)² = 9e-10.
         assert!((judged.shrink.unwrap() - 16.0 / 9.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn no_answer_is_never_right() {
+        let judged = Outcome::unanswered(&label(Family::Null, &[]), "it refused".into());
+        assert!(!judged.exact && judged.false_names.is_empty() && judged.no_answer.is_some());
     }
 
     #[test]

@@ -119,8 +119,10 @@ fn one(plan: &SetPlan, directory: &Path, number: usize) -> Result<Outcome, Box<d
     // What the diagnosis shall do without is part of the question, not of the answer; nothing else of the label is used before it.
     let label = Sealed::open(directory, number, &log::sealed_hash(&path)?)?;
     let started = Instant::now();
-    let answer = ask::diagnose(&path, &label.exclude)?;
-    Ok(judge(&label, &answer, started.elapsed().as_secs_f64()))
+    Ok(match ask::diagnose(&path, &label.exclude) {
+        Ok(answer) => judge(&label, &answer, started.elapsed().as_secs_f64()),
+        Err(error) => Outcome::unanswered(&label, error.to_string()),
+    })
 }
 
 fn conclude(args: &Args, score: &Score) -> Exit {
