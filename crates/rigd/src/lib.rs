@@ -3,9 +3,10 @@
 //!
 //! Reading order: [`cli`] (what a person asks for) → [`run`] (a session from connecting to the finalised log) → [`device`]
 //! (drivers) over [`link`] (bytes) → [`analysis`] (TE and backlash, the same for live and replay) → [`summary`], [`plot`].
-//! [`sim`] is the rig as a simulation that answers the same bytes.
+//! [`sim`] is the rig as a simulation that answers the same bytes; [`blind`] withholds what was wrong with it, and scores who finds it.
 
 pub mod analysis;
+pub mod blind;
 pub mod chart;
 pub mod cli;
 pub mod clock;

@@ -1,6 +1,6 @@
 //! With two tooth pairs in contact the mesh is stiffer than with one: TE = −dir·T·C·w(u)/A² with w = 1 − duty where one pair
 //! carries and −duty elsewhere, zero in the mean over a pitch. `duty` is the share of a pitch on one pair. Shape [duty, start]:
-//! the stretch on one pair begins at u = start.
+//! the stretch on one pair begins at u = start. The empty shape takes the stretches from the tips of the documented teeth.
 
 use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
 
@@ -26,7 +26,7 @@ impl Effect for MeshStiffnessVariation {
         if plan.loads_nm.last().is_none_or(|load| *load <= 0.0) {
             return Vec::new();
         }
-        let mut shapes = Vec::new();
+        let mut shapes = vec![Vec::new()];
         for duty in DUTIES {
             // About the pitch point, from it on, and in steps of an eighth of a pitch.
             shapes.push(vec![duty, 0.0]);
@@ -46,16 +46,20 @@ impl Effect for MeshStiffnessVariation {
         shapes
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
-        let [duty, start] = shape[..] else { return };
-        let weight = if (at.pitches - start).rem_euclid(1.0) < duty { 1.0 - duty } else { -duty };
+    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+        let weight = if let [duty, start] = shape[..] {
+            if (at.pitches - start).rem_euclid(1.0) < duty { 1.0 - duty } else { -duty }
+        } else {
+            rig.single_pair_share(at) - rig.single_pair_duty(at)
+        };
         row[0] = -at.sense * at.load_nm * weight / (at.arm_mm * at.arm_mm);
     }
 
-    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        let duty = shape.first().copied().unwrap_or_else(|| rig.mean_single_pair_duty());
         vec![
             Parameter::number("c_mm2_rad_per_nm", found.beta[0], found.std(0), "mm2.rad/(N.m)"),
-            Parameter::grid("duty", shape[0], ""),
+            Parameter::grid("duty", duty, ""),
         ]
     }
 }

@@ -21,6 +21,8 @@ pub struct Rig {
     pub output_counts_per_rev: Option<f64>,
     /// Driver teeth in contact over one turn, by sense: up to three, ending with none.
     zone: [Vec<[Option<u16>; 3]>; 2],
+    /// Share of the rolled arc on which one pair alone carries, by sense.
+    duty: [f64; 2],
     pitch_mm: f64,
 }
 
@@ -30,7 +32,21 @@ impl Rig {
     pub fn new(model: NominalModel, lines: [Option<f64>; 2], output_counts_per_rev: Option<f64>) -> Self {
         let zone = zones(&model.pair);
         let pitch_mm = model.pair.pitch_mm().unwrap_or(f64::NAN);
-        Self { model, lines, output_counts_per_rev, zone, pitch_mm }
+        // Weighted by the rolled arc, so that a pitch counts as a pitch wherever it lies.
+        let duty = [0, 1].map(|side: usize| {
+            let steps = zone[side].len().max(1);
+            let (mut single, mut all) = (0.0, 0.0);
+            for (step, entry) in zone[side].iter().enumerate() {
+                let at = model.pair.at(TAU * (step as f64 + 0.5) / steps as f64);
+                let arc = at.r1_mm / at.mu_rad.cos();
+                all += arc;
+                if entry.iter().flatten().count() < 2 {
+                    single += arc;
+                }
+            }
+            if all > 0.0 { single / all } else { 0.0 }
+        });
+        Self { model, lines, output_counts_per_rev, zone, duty, pitch_mm }
     }
 
     /// The pair.
@@ -85,6 +101,24 @@ impl Rig {
         let step = ((at.theta1_rad / TAU).rem_euclid(1.0) * ZONE_STEPS as f64) as usize;
         let entry = self.zone[side].get(step.min(ZONE_STEPS - 1)).copied().unwrap_or_default();
         entry.into_iter().flatten().map(usize::from)
+    }
+
+    /// Whether one pair alone carries there, 0 or 1.
+    #[must_use]
+    pub fn single_pair_share(&self, at: &Station) -> f64 {
+        f64::from(u8::from(self.teeth_in_contact(at).count() < 2))
+    }
+
+    /// Share of the pitch about a station on which one pair alone carries: its mean over the turn of the driver's sense.
+    #[must_use]
+    pub fn single_pair_duty(&self, at: &Station) -> f64 {
+        self.duty[usize::from(at.sense < 0.0)]
+    }
+
+    /// The same, both senses together.
+    #[must_use]
+    pub fn mean_single_pair_duty(&self) -> f64 {
+        0.5 * (self.duty[0] + self.duty[1])
     }
 
     /// Compliance of the whole train at the driven encoder, rad/(N·m): C_out + C_in i² + C_mesh/A²; 1 rad/(N·m) at the output

@@ -103,7 +103,7 @@ pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -
     let (g, b) = select(&whitened.gram, &columns);
     let mut scales_rad: Vec<f64> = (0..set.len()).map(|n| start_rad.get(n).copied().unwrap_or(3e-5)).collect();
     let mut solved = solve(&g, &b, &prior(blocks, set, &scales_rad))?;
-    for _ in 0..12 {
+    for _ in 0..8 {
         let covariance = solved.cholesky.inverse();
         let mut first = 1;
         let mut moved = 0.0_f64;
@@ -118,7 +118,7 @@ pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -
             first += width;
         }
         solved = solve(&g, &b, &prior(blocks, set, &scales_rad))?;
-        if moved < 0.02 {
+        if moved < 0.05 {
             break;
         }
     }

@@ -71,6 +71,8 @@ pub struct Pool {
     wave_values: Vec<[f64; WAVES]>,
 }
 
+/// Columns a matrix product.
+const PANEL: usize = 64;
 /// Traces smaller than this part of a block's largest direction are not seen under the plan.
 const UNSEEN: f64 = 1e-5;
 
@@ -172,7 +174,7 @@ impl Pool {
         for (mut row, w) in weighted.row_iter_mut().zip(weights) {
             row *= *w;
         }
-        let covariance = raw.tr_mul(&weighted) / total - &means * means.transpose();
+        let covariance = raw.transpose() * &weighted / total - &means * means.transpose();
         let scale = DVector::from_fn(width, |n, _| covariance[(n, n)].max(0.0).sqrt());
         if scale.iter().any(|s| !s.is_finite()) || scale.max() <= 0.0 {
             return None;
@@ -238,6 +240,25 @@ impl Pool {
             .collect();
         let mut products = DMatrix::zeros(width, width);
         products.view_mut((0, 0), (old, old)).copy_from(&self.products);
+        // Columns that are the same in every revolution, which most are: by panels as matrix products.
+        let in_cells: Vec<usize> = (0..width).filter(|c| matches!(self.values[*c], Values::Cells(_))).collect();
+        let fresh: Vec<usize> = in_cells.iter().copied().filter(|c| *c >= old).collect();
+        let matrix = self.cell_matrix(&in_cells);
+        let panels: Vec<(Vec<usize>, DMatrix<f64>)> = fresh
+            .par_chunks(PANEL)
+            .map(|panel| {
+                let left = DMatrix::from_fn(panel.len(), self.cell_weight.len(), |n, cell| weighted[panel[n] - old][cell]);
+                (panel.to_vec(), left * &matrix)
+            })
+            .collect();
+        for (panel, values) in panels {
+            for (m, a) in panel.into_iter().enumerate() {
+                for (n, b) in in_cells.iter().enumerate() {
+                    products[(a, *b)] = values[(m, n)];
+                    products[(*b, a)] = values[(m, n)];
+                }
+            }
+        }
         let rows: Vec<Vec<f64>> = (old..width)
             .into_par_iter()
             .map(|a| {
@@ -245,9 +266,8 @@ impl Pool {
                     .map(|b| {
                         let at = a - old;
                         match (&self.values[a], &self.values[b]) {
-                            (Values::Cells(_), Values::Cells(y)) | (Values::Places(_), Values::Places(y)) => {
-                                dot(&weighted[at], y)
-                            }
+                            (Values::Cells(_), Values::Cells(_)) => products[(a, b)],
+                            (Values::Places(_), Values::Places(y)) => dot(&weighted[at], y),
                             (Values::Places(_), Values::Cells(y)) => dot(&by_cell[at], y),
                             (Values::Cells(x), Values::Places(y)) => {
                                 if b >= old {
@@ -299,6 +319,16 @@ impl Pool {
             grown.view_mut((0, old), (WAVES, width - old)).copy_from(&(z * x));
             *waves = grown;
         });
+    }
+
+    fn cell_matrix(&self, columns: &[usize]) -> DMatrix<f64> {
+        let mut matrix = DMatrix::zeros(self.cell_weight.len(), columns.len());
+        for (mut to, column) in matrix.column_iter_mut().zip(columns) {
+            if let Values::Cells(x) = &self.values[*column] {
+                to.copy_from_slice(x);
+            }
+        }
+        matrix
     }
 
     /// Values of a column at every place.

@@ -79,7 +79,7 @@ impl HeldOut {
             for (n, mut row) in wx.row_iter_mut().enumerate() {
                 row *= grid.weight[revolution.places.start + n];
             }
-            let square = x.tr_mul(&wx);
+            let square = x.transpose() * &wx;
             let z = DMatrix::from_fn(WAVES, count, |w, n| {
                 let place = revolution.places.start + n;
                 let cell = grid.cell_of[place];
@@ -92,7 +92,7 @@ impl HeldOut {
                 inner[(n, n)] += 1.0 / l;
             }
             if let Some(cholesky) = Cholesky::new(inner) {
-                grams[unit] += &square * precision - c.tr_mul(&cholesky.solve(&c));
+                grams[unit] += &square * precision - c.transpose() * cholesky.solve(&c);
                 run_sums[unit].0 += &k - &k * cholesky.solve(&k);
                 run_sums[unit].1 += &c - &k * cholesky.solve(&c);
             }

@@ -1,6 +1,7 @@
 //! The command line. One command is one file; here they are only routed.
 
 mod analyse;
+mod blindtest;
 mod directions;
 mod import;
 mod info;
@@ -10,6 +11,7 @@ mod run;
 mod sim;
 mod simulator;
 mod stop;
+mod withhold;
 
 use std::process::ExitCode;
 
@@ -64,6 +66,8 @@ enum Command {
     Model(Box<model::Args>),
     /// Start the simulated rig in real time, on ports of its own
     Sim(sim::Args),
+    /// Make withheld cases on the simulated rig, diagnose them, and score the answers
+    Blindtest(blindtest::Args),
     /// End a run from another terminal, as Ctrl-C does
     Stop(stop::Args),
 }
@@ -88,6 +92,7 @@ pub fn main() -> ExitCode {
         Command::Import(args) => import::main(&args),
         Command::Model(args) => model::main(&args),
         Command::Sim(args) => sim::main(&args),
+        Command::Blindtest(args) => blindtest::main(&args),
         Command::Stop(args) => stop::main(&args),
     };
     ExitCode::from(exit as u8)

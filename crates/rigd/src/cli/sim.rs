@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use tokio::task::LocalSet;
 
-use super::{Exit, fail};
+use super::{Exit, fail, withhold};
 use crate::profile::Profile;
 use crate::run::stop::StopRequests;
 use crate::{pair, sim};
@@ -24,10 +24,15 @@ pub struct Args {
     /// An effect that the model does not know; may be repeated
     #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     undocumented: Vec<String>,
+    #[command(flatten)]
+    withhold: withhold::Args,
 }
 
 /// Runs the command.
 pub fn main(args: &Args) -> Exit {
+    if let Some(seed) = args.withhold.withhold {
+        return withhold::main(&args.withhold, seed, args.pair.as_deref());
+    }
     let spec = match pair::load(args.pair.as_deref()) {
         Ok((_, model)) => sim::spec(&model, &args.undocumented),
         Err(error) => return fail(Exit::BadInput, &error),

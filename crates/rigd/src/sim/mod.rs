@@ -21,7 +21,7 @@ use gearmodel::pitch_curve::AnyCurve;
 use thiserror::Error;
 
 pub use plant::PlantSpec;
-use plant::undocumented::UNDOCUMENTED;
+use plant::undocumented::{OUTSIDE, UNDOCUMENTED, find};
 use pty::Terminal;
 use starter::Starter;
 use world::World;
@@ -66,19 +66,22 @@ pub enum SimError {
 /// Whether the plant has an effect of this name.
 #[must_use]
 pub fn is_undocumented(name: &str) -> bool {
-    UNDOCUMENTED.iter().any(|(known, ..)| *known == name)
+    find(name).is_some()
 }
 
 /// Names of the plant's effects.
 #[must_use]
 pub fn undocumented_names() -> Vec<&'static str> {
-    UNDOCUMENTED.iter().map(|(name, ..)| *name).collect()
+    UNDOCUMENTED.iter().chain(OUTSIDE).map(|effect| effect.name).collect()
 }
 
 /// The plant's effects, a line each.
 #[must_use]
 pub fn describe_undocumented() -> String {
-    UNDOCUMENTED.iter().map(|(name, summary, _)| format!("{name:<32} {summary}")).collect::<Vec<_>>().join("\n")
+    let line = |effect: &plant::undocumented::Undocumented| format!("{:<32} {}", effect.name, effect.summary);
+    let known = UNDOCUMENTED.iter().map(line);
+    let outside = OUTSIDE.iter().map(|effect| format!("{} (outside the library)", line(effect)));
+    known.chain(outside).collect::<Vec<_>>().join("\n")
 }
 
 /// The plant for a nominal pair: its gears and documented errors, and what is left undocumented.
@@ -106,12 +109,11 @@ pub fn spec(model: &NominalModel, undocumented: &[String]) -> Result<PlantSpec, 
     spec.shafts.compliance_output_rad_per_nm = errors.shaft_compliance_output_rad_per_nm;
     spec.shafts.compliance_input_rad_per_nm = errors.shaft_compliance_input_rad_per_nm;
     spec.mesh.compliance_mm2_rad_per_nm = errors.mesh_compliance_mm2_rad_per_nm;
+    spec.teeth.addendum = pair.addendum();
     for name in undocumented {
-        let (.., apply) = UNDOCUMENTED
-            .iter()
-            .find(|(known, ..)| known == name)
+        let effect = find(name)
             .ok_or_else(|| SimError::Effect { name: name.clone(), known: undocumented_names().join(", ") })?;
-        apply(&mut spec);
+        effect.apply_usual(&mut spec);
     }
     Ok(spec)
 }

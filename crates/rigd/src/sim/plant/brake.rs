@@ -51,6 +51,12 @@ pub struct BrakeSpec {
     pub outer_resistance_k_per_w: f64,
     /// Loss of torque per kelvin of powder temperature above ambient; 0 switches fading off.
     pub fading_per_k: f64,
+    /// Ripple of the torque over the driven shaft's turn, in parts of the torque.
+    pub ripple_ratio: f64,
+    /// Its order.
+    pub ripple_order: u32,
+    /// Its phase, rad: the torque is T (1 + ratio · sin(order · θ2 − phase)).
+    pub ripple_phase_rad: f64,
 }
 
 impl Default for BrakeSpec {
@@ -74,6 +80,9 @@ impl Default for BrakeSpec {
             inner_resistance_k_per_w: 0.1,
             outer_resistance_k_per_w: 0.25,
             fading_per_k: 0.0,
+            ripple_ratio: 0.0,
+            ripple_order: 1,
+            ripple_phase_rad: 0.0,
         }
     }
 }
@@ -161,7 +170,10 @@ impl BrakeSpec {
             resistance,
             "housing to ambient",
         )?;
-        in_range("brake.fading_per_k", self.fading_per_k, "1/K", (0.0, 0.01), "0 switches fading off")
+        in_range("brake.fading_per_k", self.fading_per_k, "1/K", (0.0, 0.01), "0 switches fading off")?;
+        in_range("brake.ripple_ratio", self.ripple_ratio, "", (0.0, 0.95), "in parts of the torque")?;
+        in_range("brake.ripple_order", f64::from(self.ripple_order), "", (1.0, 64.0), "of the driven shaft")?;
+        in_range("brake.ripple_phase_rad", self.ripple_phase_rad, "rad", (-1e6, 1e6), "give a finite angle")
     }
 }
 
@@ -246,16 +258,21 @@ impl Brake {
         self.spec.ambient_c + self.powder_k
     }
 
-    /// Friction torque available on the driven shaft in the next step, N·m, at the speed of the driven shaft.
+    /// Friction torque available on the driven shaft in the next step, N·m, at the speed and angle of the driven shaft.
     #[inline]
-    pub fn capacity_nm(&mut self, shaft_rad_per_s: f64) -> f64 {
+    pub fn capacity_nm(&mut self, shaft_rad_per_s: f64, shaft_rad: f64) -> f64 {
         // di/dt = (V/R − i)/τ_i and dT/dt = (T_static(i) − T)/τ_T, exact over the step for a steady right-hand side.
         self.current_a += self.current_step * (self.target_a - self.current_a);
         let fixed_nm = self.hysteresis.torque_nm(self.current_a);
         self.torque_nm += self.torque_step * (fixed_nm - self.torque_nm);
         let slip_rad_per_s = shaft_rad_per_s.abs() * self.spec.step_up;
         let deviation = self.stick_slip.deviation(slip_rad_per_s * self.dt_s, slip_rad_per_s);
-        (self.torque_nm * self.fading * (1.0 + deviation) + self.spec.drag_nm) * self.spec.step_up
+        let mut torque_nm = (self.torque_nm * self.fading * (1.0 + deviation) + self.spec.drag_nm) * self.spec.step_up;
+        if self.spec.ripple_ratio != 0.0 {
+            let turn = f64::from(self.spec.ripple_order) * shaft_rad - self.spec.ripple_phase_rad;
+            torque_nm *= 1.0 + self.spec.ripple_ratio * turn.sin();
+        }
+        torque_nm
     }
 
     /// Takes up the heat of one step of friction `torque_nm` at the driven shaft.
@@ -295,7 +312,7 @@ mod tests {
     fn settle(brake: &mut Brake, speed: f64, seconds: f64) -> f64 {
         let mut torque = 0.0;
         for _ in 0..(seconds * 1e3) as usize {
-            torque = brake.capacity_nm(speed);
+            torque = brake.capacity_nm(speed, 0.0);
             brake.heat(torque, speed);
         }
         torque
@@ -328,7 +345,7 @@ mod tests {
         brake.set_drive(false, 0.2, 10.0);
         settle(&mut brake, 2.0, 5.0);
         assert!(brake.current_a() < 1e-9);
-        assert!((brake.capacity_nm(2.0) - 0.3).abs() < 1e-3);
+        assert!((brake.capacity_nm(2.0, 0.0) - 0.3).abs() < 1e-3);
     }
 
     #[test]
@@ -356,7 +373,7 @@ mod tests {
         brake.set_drive(true, 0.5, 60.0);
         settle(&mut brake, 0.5, 10.0);
         // 5 rpm on the driven shaft are 20 rpm of slip: no stick-slip.
-        let torques: Vec<f64> = (0..1000).map(|_| brake.capacity_nm(0.53)).collect();
+        let torques: Vec<f64> = (0..1000).map(|_| brake.capacity_nm(0.53, 0.0)).collect();
         assert!(torques.iter().all(|t| (t - torques[0]).abs() < 1e-9));
     }
 

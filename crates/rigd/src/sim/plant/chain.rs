@@ -50,6 +50,8 @@ pub(super) struct ChainSpec {
     pub brake_coupling: Spring,
     /// tan²(β/2) of a Cardan joint in the output shaft at the angle β, and its phase, rad.
     pub cardan: Option<(f64, f64)>,
+    /// The same of a joint in the input shaft.
+    pub input_cardan: Option<(f64, f64)>,
 }
 
 /// What acts from outside in one step.
@@ -59,6 +61,10 @@ pub(super) struct Drive {
     pub torque_nm: f64,
     /// Friction of the drive to be taken implicitly, N·m·s/rad.
     pub viscous_nm_s_per_rad: f64,
+    /// Dry friction on the output disc, explicit, N·m.
+    pub seal_nm: f64,
+    /// The same where it is to be taken implicitly, N·m·s/rad.
+    pub seal_nm_s_per_rad: f64,
     /// Friction that the brake can offer.
     pub brake_capacity_nm: f64,
     /// Angle by which the output clamp has slipped, rad.
@@ -103,10 +109,11 @@ struct ContactLaw {
 
 impl Chain {
     pub fn new(spec: ChainSpec, input_rad: f64, driven_rad: f64) -> Self {
-        let encoder = spec.output_rad(driven_rad).0;
+        let encoder = joint(spec.cardan, driven_rad).0;
+        let gear1 = joint(spec.input_cardan, input_rad).0;
         Self {
             spec,
-            q: [input_rad, input_rad, driven_rad, encoder, encoder],
+            q: [input_rad, gear1, driven_rad, encoder, encoder],
             v: [0.0; 5],
             contact: None,
             mesh_torque_nm: 0.0,
@@ -118,7 +125,12 @@ impl Chain {
 
     /// Twist of the output shaft, rad, without what the clamp has slipped.
     pub fn output_twist_rad(&self, clamp_slip_rad: f64) -> f64 {
-        self.spec.output_rad(self.q[GEAR2]).0 - self.q[DISC] - clamp_slip_rad
+        joint(self.spec.cardan, self.q[GEAR2]).0 - self.q[DISC] - clamp_slip_rad
+    }
+
+    /// Twist of the input shaft, rad.
+    pub fn input_twist_rad(&self) -> f64 {
+        joint(self.spec.input_cardan, self.q[INPUT]).0 - self.q[GEAR1]
     }
 
     /// Advances by `h` seconds.
@@ -131,9 +143,10 @@ impl Chain {
         let place = mesh.locate(ahead1);
         let lift_rad = drive.run_out_mm * mesh.inverse_radius(place);
 
-        let (output_rad, output_ratio) = self.spec.output_rad(q[GEAR2]);
-        let input_rate = v[INPUT] - v[GEAR1];
-        let (input_torque, input_slope) = self.spec.input_shaft.midpoint(h, q[INPUT] - q[GEAR1], input_rate);
+        let (output_rad, output_ratio) = joint(self.spec.cardan, q[GEAR2]);
+        let (input_rad, input_ratio) = joint(self.spec.input_cardan, q[INPUT]);
+        let input_rate = input_ratio * v[INPUT] - v[GEAR1];
+        let (input_torque, input_slope) = self.spec.input_shaft.midpoint(h, input_rad - q[GEAR1], input_rate);
         let twist = output_rad - q[DISC] - drive.clamp_slip_rad;
         let output_rate = output_ratio * v[GEAR2] - v[DISC];
         let (output_torque, output_slope) = self.spec.output_shaft.midpoint(h, twist, output_rate);
@@ -142,24 +155,25 @@ impl Chain {
 
         let bearing = h * self.spec.bearing_nm_s_per_rad;
         let motor = h * drive.viscous_nm_s_per_rad;
+        let seal = h * drive.seal_nm_s_per_rad;
         let [g01, g23, g34] = [h * input_slope, h * output_slope, h * coupling_slope];
         let inertia = &self.spec.inertia_kg_m2;
         let assembly = Assembly {
             diagonal: [
-                inertia[INPUT] + g01 + motor,
+                inertia[INPUT] + g01 * input_ratio * input_ratio + motor,
                 inertia[GEAR1] + g01 + bearing,
                 inertia[GEAR2] + g23 * output_ratio * output_ratio + bearing,
-                inertia[DISC] + g23 + g34,
+                inertia[DISC] + g23 + g34 + seal,
                 inertia[ROTOR] + g34,
             ],
             right: [
-                h * (drive.torque_nm - input_torque) - motor * v[INPUT],
+                h * (drive.torque_nm - input_torque * input_ratio) - motor * v[INPUT],
                 h * input_torque - bearing * v[GEAR1],
                 -h * output_torque * output_ratio - bearing * v[GEAR2],
-                h * (output_torque - coupling_torque),
+                h * (output_torque - coupling_torque - drive.seal_nm) - seal * v[DISC],
                 h * coupling_torque,
             ],
-            coupling: [-g01, -g23 * output_ratio, -g34],
+            coupling: [-g01 * input_ratio, -g23 * output_ratio, -g34],
         };
 
         let law = |flank: Flank| -> ContactLaw {
@@ -210,7 +224,7 @@ impl Chain {
         }
         self.contact = contact;
         self.mesh_torque_nm = torque;
-        self.input_torque_nm = input_torque + input_slope * (change[INPUT] - change[GEAR1]);
+        self.input_torque_nm = input_torque + input_slope * (input_ratio * change[INPUT] - change[GEAR1]);
         let output_change = output_ratio * change[GEAR2] - change[DISC];
         self.load_torque_nm = (output_torque + output_slope * output_change) * output_ratio;
         let coupling = coupling_torque + coupling_slope * (change[DISC] - change[ROTOR]);
@@ -218,21 +232,19 @@ impl Chain {
     }
 }
 
-impl ChainSpec {
-    /// Angle that gear 2 hands on to the output shaft, and its derivative.
-    ///
-    /// Cardan's joint: tan q_out = tan q_in/cos β, that is q_in + atan2(ε sin w, 1 − ε cos w) with ε = tan²(β/2) and
-    /// w = 2 q_in − phase; its derivative is (1 − ε²)/(1 − 2 ε cos w + ε²).
-    #[inline]
-    fn output_rad(&self, driven_rad: f64) -> (f64, f64) {
-        match self.cardan {
-            None => (driven_rad, 1.0),
-            Some((epsilon, phase)) => {
-                let (sin, cos) = (2.0 * driven_rad - phase).sin_cos();
-                let square = epsilon * epsilon;
-                let ratio = (1.0 - square) / (1.0 - 2.0 * epsilon * cos + square);
-                (driven_rad + (epsilon * sin).atan2(1.0 - epsilon * cos), ratio)
-            }
+/// Angle behind a Cardan joint that is turned to `angle_rad`, and its derivative; without a joint the angle itself.
+///
+/// tan q_out = tan q_in/cos β, that is q_in + atan2(ε sin w, 1 − ε cos w) with ε = tan²(β/2) and w = 2 q_in − phase; its derivative
+/// is (1 − ε²)/(1 − 2 ε cos w + ε²).
+#[inline]
+fn joint(cardan: Option<(f64, f64)>, angle_rad: f64) -> (f64, f64) {
+    match cardan {
+        None => (angle_rad, 1.0),
+        Some((epsilon, phase)) => {
+            let (sin, cos) = (2.0 * angle_rad - phase).sin_cos();
+            let square = epsilon * epsilon;
+            let ratio = (1.0 - square) / (1.0 - 2.0 * epsilon * cos + square);
+            (angle_rad + (epsilon * sin).atan2(1.0 - epsilon * cos), ratio)
         }
     }
 }

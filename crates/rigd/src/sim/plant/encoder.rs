@@ -1,6 +1,7 @@
 //! Incremental encoders: disc errors, reading noise, counts and the index pulse.
 
 use super::error::{PlantError, in_range};
+use super::resonance::SoftCouplingSpec;
 use super::table::floor;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -21,6 +22,12 @@ pub struct EncoderSpec {
     pub ellipticity: f64,
     /// Phase of the ellipticity, rad: to first order the reading gains ε sin(2θ − phase).
     pub ellipticity_phase_rad: f64,
+    /// Sub-divisional error: offset of the two signals in parts of their amplitude.
+    pub interpolation: f64,
+    /// Its phase, rad: to first order the reading gains (offset/lines) sin(lines · θ − phase).
+    pub interpolation_phase_rad: f64,
+    /// Angle by which the shaft stands ahead of the scale, rad: how the disc is clocked against the gear.
+    pub clocking_rad: f64,
     /// White reading noise, rad RMS.
     pub noise_rad: f64,
 }
@@ -35,6 +42,9 @@ impl EncoderSpec {
             eccentricity_phase_rad: 0.0,
             ellipticity: 0.0,
             ellipticity_phase_rad: 0.0,
+            interpolation: 0.0,
+            interpolation_phase_rad: 0.0,
+            clocking_rad: 0.0,
             noise_rad,
         }
     }
@@ -60,6 +70,16 @@ impl EncoderSpec {
         let phase = (-1e6, 1e6);
         in_range("encoders.eccentricity_phase_rad", self.eccentricity_phase_rad, "rad", phase, "give a finite angle")?;
         in_range("encoders.ellipticity_phase_rad", self.ellipticity_phase_rad, "rad", phase, "give a finite angle")?;
+        let offset = (0.0, 0.9);
+        in_range("encoders.interpolation", self.interpolation, "", offset, "offset in parts of the signal")?;
+        in_range(
+            "encoders.interpolation_phase_rad",
+            self.interpolation_phase_rad,
+            "rad",
+            phase,
+            "give a finite angle",
+        )?;
+        in_range("encoders.clocking_rad", self.clocking_rad, "rad", (-1.0, 1.0), "a mounting error")?;
         in_range("encoders.noise_rad", self.noise_rad, "rad", (0.0, 0.01), "RMS of one reading")
     }
 }
@@ -84,6 +104,8 @@ pub struct EncodersSpec {
     pub time_skew_s: f64,
     /// Lost counts of the output.
     pub output_count_loss: CountLossSpec,
+    /// Soft coupling of the output encoder.
+    pub output_coupling: Option<SoftCouplingSpec>,
 }
 
 impl Default for EncodersSpec {
@@ -93,6 +115,7 @@ impl Default for EncodersSpec {
             output: EncoderSpec::with_noise(4e-6),
             time_skew_s: 0.0,
             output_count_loss: CountLossSpec { counts: 0, losses_per_rev: 0.0 },
+            output_coupling: None,
         }
     }
 }
@@ -102,6 +125,7 @@ impl EncodersSpec {
         self.input.validate()?;
         self.output.validate()?;
         in_range("encoders.time_skew_s", self.time_skew_s, "s", (-0.01, 0.01), "keep it within ±10 ms")?;
+        self.output_coupling.as_ref().map_or(Ok(()), SoftCouplingSpec::validate)?;
         let loss = &self.output_count_loss;
         in_range(
             "encoders.output_count_loss.counts",
@@ -131,6 +155,9 @@ pub(super) struct Encoder {
     noise_counts: f64,
     eccentricity: (f64, f64),
     ellipticity: (f64, f64),
+    /// Offset of the signals, phase, lines.
+    interpolation: (f64, f64, f64),
+    clocking_rad: f64,
     exact_disc: bool,
     /// Count of the scale at which the counter was switched on, plus what it has lost since.
     offset: i64,
@@ -150,7 +177,9 @@ impl Encoder {
             noise_counts: spec.noise_rad * counts_per_rev / TAU,
             eccentricity: (spec.eccentricity, spec.eccentricity_phase_rad),
             ellipticity: (spec.ellipticity, spec.ellipticity_phase_rad),
-            exact_disc: spec.eccentricity == 0.0 && spec.ellipticity == 0.0,
+            interpolation: (spec.interpolation, spec.interpolation_phase_rad, f64::from(spec.lines)),
+            clocking_rad: spec.clocking_rad,
+            exact_disc: spec.eccentricity == 0.0 && spec.ellipticity == 0.0 && spec.interpolation == 0.0,
             offset: 0,
             turn: 0,
             index_counts: None,
@@ -167,8 +196,12 @@ impl Encoder {
     /// Displaced disc: with its centre at ε (in track radii) in the direction w = θ − phase from the head's, the head
     /// sees the scale at θ + atan2(ε sin w, 1 − ε cos w). Squeezed disc: tan turns by (1 + ε)/(1 − ε), the same form in
     /// twice the angle.
+    ///
+    /// Interpolation: the signals (cos φ, sin φ) of the line phase φ = lines · θ are off their centre by o, so their angle is that of a
+    /// displaced disc, φ + atan2(o sin(φ − phase), 1 − o cos(φ − phase)); its second order is o²/2.
     #[inline]
     fn scale_rad(&self, shaft_rad: f64) -> f64 {
+        let shaft_rad = shaft_rad - self.clocking_rad;
         if self.exact_disc {
             return shaft_rad;
         }
@@ -176,7 +209,12 @@ impl Encoder {
         let (ellipticity, phase2) = self.ellipticity;
         let seen = distorted(shaft_rad, eccentricity, shaft_rad - phase);
         let squeezed = distorted(shaft_rad, ellipticity, 2.0 * shaft_rad - phase2);
-        seen + squeezed - shaft_rad
+        let scale_rad = seen + squeezed - shaft_rad;
+        let (offset, phase3, lines) = self.interpolation;
+        if offset == 0.0 {
+            return scale_rad;
+        }
+        distorted(lines * scale_rad, offset, lines * scale_rad - phase3) / lines
     }
 
     /// Counter value with the shaft at `shaft_rad`; latches the index on the way.
@@ -269,6 +307,28 @@ mod tests {
             let expected = (theta.tan() * (1.0 + epsilon) / (1.0 - epsilon)).atan();
             assert!((encoder.scale_rad(theta) - expected).abs() < 1e-14);
         }
+    }
+
+    #[test]
+    fn displaced_signals_divide_the_lines_unevenly() {
+        let (offset, phase) = (0.2, 0.7);
+        let encoder = encoder(|spec| (spec.interpolation, spec.interpolation_phase_rad) = (offset, phase), 0.0);
+        for n in 0..50 {
+            let theta = 1.3 + f64::from(n) * 1.7e-5;
+            // Independent construction: the angle of (cos φ, sin φ) less the offset, which points to the phase.
+            let line: f64 = 18_000.0 * theta;
+            let (x, y) = (line.cos() - offset * phase.cos(), line.sin() - offset * phase.sin());
+            let miss = y.atan2(x) - 18_000.0 * encoder.scale_rad(theta);
+            assert!((miss - TAU * (miss / TAU).round()).abs() < 1e-9);
+            let first = offset / 18_000.0 * (line - phase).sin();
+            assert!((encoder.scale_rad(theta) - theta - first).abs() < 0.6 * offset * offset / 18_000.0);
+        }
+    }
+
+    #[test]
+    fn a_clocked_shaft_stands_ahead_of_its_scale() {
+        let encoder = encoder(|spec| spec.clocking_rad = 1e-3, 0.0);
+        assert!((encoder.scale_rad(2.0) - 1.999).abs() < 1e-15);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::error::{PlantError, in_range};
 use super::flank::Flank;
 use super::geometry::GearSpec;
 use super::table::{ContactTable, FlankState, Place};
+use super::teeth::{ToothSpec, ToothTable};
 
 /// Default compliance of the mesh, mm²·rad/(N·m): 1000/k for k = 5.9e5 N/mm.
 pub const DEFAULT_MESH_COMPLIANCE_MM2_RAD_PER_NM: f64 = 1.7e-3;
@@ -41,6 +42,22 @@ impl Default for HousingSpec {
     }
 }
 
+/// Bearings under the force of the teeth.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct BearingSpec {
+    /// Compliance of both gears' bearings along the normal, mm/N.
+    pub compliance_mm_per_n: f64,
+    /// Clearance along the normal, mm: the force of the teeth pushes the gears apart by as much, whatever its size.
+    pub clearance_mm: f64,
+}
+
+impl BearingSpec {
+    pub(super) fn validate(&self) -> Result<(), PlantError> {
+        in_range("bearings.compliance_mm_per_n", self.compliance_mm_per_n, "mm/N", (0.0, 0.01), "1e-5 is soft")?;
+        in_range("bearings.clearance_mm", self.clearance_mm, "mm", (0.0, 0.5), "0.01 is usual")
+    }
+}
+
 impl MeshSpec {
     pub(super) fn validate(&self) -> Result<(), PlantError> {
         let compliance = self.compliance_mm2_rad_per_nm;
@@ -64,12 +81,24 @@ pub(super) struct Mesh {
     warm: Option<Box<[ContactTable; 2]>>,
     /// Weights of cold, half warm and warm: a parabola through exact contact at three centre distances.
     weights: [f64; 3],
-    stiffness_nm_per_mm2_rad: f64,
+    /// Mean compliance of teeth and bearings.
+    compliance_mm2_rad_per_nm: f64,
     damping_time_s: f64,
+    teeth: Option<ToothTable>,
+    clearance_mm: f64,
+    /// How far each flank stands back along its normal for clearance and wear, mm.
+    recess_mm: f64,
+    cos_alpha: f64,
 }
 
 impl Mesh {
-    pub fn new(gears: &GearSpec, mesh: &MeshSpec, housing: &HousingSpec) -> Result<Self, PlantError> {
+    pub fn new(
+        gears: &GearSpec,
+        mesh: &MeshSpec,
+        teeth: &ToothSpec,
+        bearings: &BearingSpec,
+        housing: &HousingSpec,
+    ) -> Result<Self, PlantError> {
         let growth_mm = housing.growth_mm;
         let mut cold = ContactTable::new(gears, 0.0, 0)?;
         let mut warm = None;
@@ -91,9 +120,20 @@ impl Mesh {
             cold,
             warm,
             weights: [1.0, 0.0, 0.0],
-            stiffness_nm_per_mm2_rad: 1.0 / mesh.compliance_mm2_rad_per_nm.max(RIGID_MESH_MM2_RAD_PER_NM),
+            // Teeth and bearings in a row: 1 mm/N along the normal is 1000 mm²·rad/(N·m).
+            compliance_mm2_rad_per_nm: mesh.compliance_mm2_rad_per_nm + 1e3 * bearings.compliance_mm_per_n,
             damping_time_s: mesh.damping_time_s,
+            teeth: ToothTable::new(teeth, gears),
+            clearance_mm: bearings.clearance_mm,
+            recess_mm: bearings.clearance_mm,
+            cos_alpha: gears.pressure_angle_deg.to_radians().cos(),
         })
+    }
+
+    /// Sets how much the teeth have worn together, mm along the pitch curve.
+    pub fn set_wear(&mut self, wear_mm: f64) {
+        // A thinning j opens (j/2) cos α along each normal.
+        self.recess_mm = self.clearance_mm + 0.5 * wear_mm * self.cos_alpha;
     }
 
     /// Sets how warm the housing is: 0 cold, 1 warm.
@@ -114,16 +154,27 @@ impl Mesh {
     #[inline]
     pub fn flank(&self, place: Place, flank: Flank) -> FlankState {
         let cold = self.cold.flank(place, flank);
-        match &self.warm {
+        let mut at = match &self.warm {
             None => cold,
             Some(warm) => self.blend(cold, warm[0].flank(place, flank), warm[1].flank(place, flank)),
+        };
+        at.compliance_mm2_rad_per_nm = self.compliance_mm2_rad_per_nm;
+        if self.recess_mm != 0.0 {
+            at.psi_rad -= flank.sign() * self.recess_mm / at.arm_squared_mm2.sqrt();
         }
+        if let Some(teeth) = &self.teeth {
+            let tooth = teeth.at(place.theta1_rad, flank);
+            at.psi_rad += tooth.psi_rad;
+            at.ratio += tooth.ratio;
+            at.compliance_mm2_rad_per_nm += tooth.compliance;
+        }
+        at
     }
 
     /// K = k (r2 cos(α ∓ μ))², N·m/rad about the driven axis: τ2 = K (ψ − θ2).
     #[inline]
     pub fn stiffness_nm_per_rad(&self, at: &FlankState) -> f64 {
-        at.arm_squared_mm2 * self.stiffness_nm_per_mm2_rad
+        at.arm_squared_mm2 / at.compliance_mm2_rad_per_nm.max(RIGID_MESH_MM2_RAD_PER_NM)
     }
 
     #[inline]
@@ -137,6 +188,7 @@ impl Mesh {
             psi_rad: a * cold.psi_rad + b * half.psi_rad + c * warm.psi_rad,
             ratio: a * cold.ratio + b * half.ratio + c * warm.ratio,
             arm_squared_mm2: a * cold.arm_squared_mm2 + b * half.arm_squared_mm2 + c * warm.arm_squared_mm2,
+            ..cold
         }
     }
 }
@@ -150,7 +202,8 @@ mod tests {
     fn a_warming_housing_passes_through_exact_contact() {
         let gears = GearSpec::default();
         let housing = HousingSpec { growth_mm: 0.06, time_constant_s: 1.0 };
-        let mut mesh = Mesh::new(&gears, &MeshSpec::default(), &housing).unwrap();
+        let (teeth, bearings) = (ToothSpec::default(), BearingSpec::default());
+        let mut mesh = Mesh::new(&gears, &MeshSpec::default(), &teeth, &bearings, &housing).unwrap();
         for x in [0.0, 0.2, 0.5, 0.77, 1.0] {
             mesh.set_warmth(x);
             let pair = MountedPair::new(&gears, 0.06 * x);

@@ -7,10 +7,12 @@
 //! | part | file |
 //! |---|---|
 //! | pitch curves, tooth contact, its table over the angle, elastic mesh | `geometry`, `flank`, `table`, `mesh` |
+//! | errors, damage, wear and stiffness of single teeth | `teeth` |
 //! | five inertias and the integrator | `chain` |
 //! | servo drive | `servo` |
 //! | powder brake, its hysteresis, its stick-slip | `brake`, `hysteresis`, `stick_slip` |
-//! | encoders, counters, skew between them | `encoder`, `skew` |
+//! | encoders, counters, skew between them, a soft coupling | `encoder`, `skew`, `resonance` |
+//! | displacements of a reading that no known effect makes | `oddity` |
 //! | bearings' run-out, slipping clamp, lost counts | `run_out`, `slippage` |
 //! | effects that the nominal model does not know | [`undocumented`] |
 //!
@@ -24,6 +26,8 @@ mod flank;
 mod geometry;
 mod hysteresis;
 mod mesh;
+mod oddity;
+mod resonance;
 mod rig;
 mod run_out;
 mod servo;
@@ -32,6 +36,7 @@ mod slippage;
 mod spec;
 mod stick_slip;
 mod table;
+mod teeth;
 #[cfg(test)]
 mod tests;
 pub mod undocumented;
@@ -41,7 +46,9 @@ pub use encoder::{CountLossSpec, EncoderSpec, EncodersSpec};
 pub use error::PlantError;
 pub use flank::Flank;
 pub use geometry::GearSpec;
-pub use mesh::{DEFAULT_MESH_COMPLIANCE_MM2_RAD_PER_NM, HousingSpec, MeshSpec};
+pub use mesh::{BearingSpec, DEFAULT_MESH_COMPLIANCE_MM2_RAD_PER_NM, HousingSpec, MeshSpec};
+pub use oddity::{Carrier, Oddity, Weight};
+pub use resonance::SoftCouplingSpec;
 pub use rig::{Plant, Sample, Truth};
 pub use run_out::NoiseSpec;
 pub use servo::DriveSpec;
@@ -49,4 +56,5 @@ pub use slippage::ClampSpec;
 pub use spec::{
     DEFAULT_SHAFT_COMPLIANCE_INPUT_RAD_PER_NM, DEFAULT_SHAFT_COMPLIANCE_OUTPUT_RAD_PER_NM, PlantSpec, ShaftSpec,
 };
-pub use undocumented::UNDOCUMENTED;
+pub use teeth::{DamageSpec, ProfileOrder, ToothSpec};
+pub use undocumented::{OUTSIDE, UNDOCUMENTED};

@@ -7,6 +7,8 @@ use super::error::{PlantError, in_range};
 use super::flank::Flank;
 use super::geometry::PitchCurves;
 use super::mesh::Mesh;
+use super::oddity::{Running, Surroundings};
+use super::resonance::SoftCoupling;
 use super::run_out::RunOut;
 use super::servo::Servo;
 use super::skew::Delay;
@@ -54,6 +56,8 @@ pub struct Truth {
     pub output_windup_rad: f64,
     /// Slip of the clamp so far, rad.
     pub clamp_slip_rad: f64,
+    /// Times that the output's counter has lost counts.
+    pub count_losses: u64,
     /// Driven angle less f(driver angle) at the encoders, rad, without any reading error.
     pub transmission_error_rad: f64,
     /// The flank in contact; none while the teeth are apart.
@@ -72,9 +76,18 @@ pub struct Plant {
     input: Encoder,
     output: Encoder,
     run_out: RunOut,
+    slow_run_out: Option<RunOut>,
     creep: Option<Creep>,
     count_loss: Option<CountLoss>,
+    count_losses: u64,
     skew: Option<Delay>,
+    coupling: Option<SoftCoupling>,
+    /// Lead of the output encoder's disc over its shaft, rad.
+    coupling_twist_rad: f64,
+    oddities: Vec<Running>,
+    /// When the housing began to warm up, s.
+    warming_since_s: f64,
+    wear_mm: f64,
     clamp_slip_rad: f64,
     start_s: f64,
     samples: u64,
@@ -96,7 +109,7 @@ impl Plant {
     pub fn new(spec: &PlantSpec, sample_rate_hz: f64, seed: u64) -> Result<Self, PlantError> {
         spec.validate()?;
         let curves = PitchCurves::new(&spec.gears);
-        let mesh = Mesh::new(&spec.gears, &spec.mesh, &spec.housing)?;
+        let mesh = Mesh::new(&spec.gears, &spec.mesh, &spec.teeth, &spec.bearings, &spec.housing)?;
         let draw: f64 = StandardUniform.sample(&mut stream(seed, 1));
         // Not within a thousandth of a turn of the index, where noise might or might not pass it.
         let input_rad = TAU * (0.001 + 0.998 * draw);
@@ -110,10 +123,20 @@ impl Plant {
             brake: Brake::new(&spec.brake, stream(seed, 2)),
             input: Encoder::new(&spec.encoders.input, chain.q[INPUT], stream(seed, 3)),
             output: Encoder::new(&spec.encoders.output, chain.q[DISC], stream(seed, 4)),
-            run_out: RunOut::new(&spec.noise, stream(seed, 5)),
+            run_out: RunOut::new(spec.noise.run_out_rms_mm, spec.noise.run_out_correlation_rev, stream(seed, 5)),
+            slow_run_out: (spec.noise.slow_run_out_rms_mm != 0.0).then(|| {
+                let noise = &spec.noise;
+                RunOut::new(noise.slow_run_out_rms_mm, noise.slow_run_out_correlation_rev, stream(seed, 8))
+            }),
             creep: Creep::new(&spec.clamp, stream(seed, 6)),
             count_loss: CountLoss::new(loss.counts, loss.losses_per_rev, stream(seed, 7)),
+            count_losses: 0,
             skew: None,
+            coupling: spec.encoders.output_coupling.map(|coupling| SoftCoupling::new(coupling, 0.0)),
+            coupling_twist_rad: 0.0,
+            oddities: (10..).zip(&spec.oddities).map(|(n, oddity)| Running::new(oddity, stream(seed, n))).collect(),
+            warming_since_s: 0.0,
+            wear_mm: 0.0,
             clamp_slip_rad: 0.0,
             start_s: 0.0,
             samples: 0,
@@ -166,7 +189,11 @@ impl Plant {
         self.samples += 1;
         if self.spec.housing.growth_mm != 0.0 {
             // Δa(t) = Δa (1 − exp(−t/τ))
-            self.mesh.set_warmth(-(-self.time_s() / self.spec.housing.time_constant_s).exp_m1());
+            let warm_s = self.time_s() - self.warming_since_s;
+            self.mesh.set_warmth(-(-warm_s / self.spec.housing.time_constant_s).exp_m1());
+        }
+        if self.spec.teeth.wear_mm_per_rev_nm != 0.0 {
+            self.mesh.set_wear(self.wear_mm);
         }
         let (mut input_rad, mut output_rad) = (self.chain.q[INPUT], self.chain.q[DISC]);
         if let Some(skew) = &self.skew {
@@ -175,6 +202,18 @@ impl Plant {
             } else {
                 output_rad = skew.angle_rad();
             }
+        }
+        output_rad += self.coupling_twist_rad;
+        if !self.oddities.is_empty() {
+            let rig = Surroundings {
+                time_s: self.time_s(),
+                dt_s: 1.0 / self.sample_rate_hz,
+                theta1_rad: self.chain.q[INPUT],
+                theta2_rad: self.chain.q[DISC],
+                speed_rad_per_s: self.chain.v[INPUT],
+                load_nm: self.chain.load_torque_nm,
+            };
+            output_rad += self.oddities.iter_mut().map(|oddity| oddity.advance(&rig)).sum::<f64>();
         }
         Sample { input_counts: self.input.read(input_rad), output_counts: self.output.read(output_rad) }
     }
@@ -185,12 +224,16 @@ impl Plant {
         let torque_nm = self.servo.torque_nm(self.chain.q[INPUT], self.chain.v[INPUT]);
         let (friction_nm, viscous_nm_s_per_rad) = self.servo.friction();
         let travel_rad = (h * self.chain.v[GEAR1]).abs();
+        let (seal_nm, seal_nm_s_per_rad) = self.seal();
         let drive = Drive {
             torque_nm: torque_nm - friction_nm,
             viscous_nm_s_per_rad,
-            brake_capacity_nm: self.brake.capacity_nm(self.chain.v[ROTOR]),
+            seal_nm,
+            seal_nm_s_per_rad,
+            brake_capacity_nm: self.brake.capacity_nm(self.chain.v[ROTOR], self.chain.q[ROTOR]),
             clamp_slip_rad: self.clamp_slip_rad,
-            run_out_mm: self.run_out.advance(travel_rad),
+            run_out_mm: self.run_out.advance(travel_rad)
+                + self.slow_run_out.as_mut().map_or(0.0, |slow| slow.advance(travel_rad)),
         };
         self.chain.step(h, &drive, &self.mesh);
         self.brake.heat(self.chain.brake_torque_nm, self.chain.v[ROTOR]);
@@ -198,12 +241,36 @@ impl Plant {
             self.clamp_slip_rad = creep.advance(travel_rad, self.chain.load_torque_nm);
         }
         if let Some(loss) = &mut self.count_loss {
-            self.output.lose(loss.advance(travel_rad));
+            let lost = loss.advance(travel_rad);
+            if lost != 0 {
+                self.output.lose(lost);
+                self.count_losses += (lost / self.spec.encoders.output_count_loss.counts).unsigned_abs();
+            }
+        }
+        // j grows with ∫ |T| dθ1/2π.
+        self.wear_mm += self.spec.teeth.wear_mm_per_rev_nm * self.chain.load_torque_nm.abs() * travel_rad / TAU;
+        if let Some(coupling) = &mut self.coupling {
+            self.coupling_twist_rad = coupling.advance(h, self.chain.v[DISC]);
         }
         let early = self.early_shaft();
         if let Some(skew) = &mut self.skew {
             skew.push(self.chain.q[early]);
         }
+    }
+
+    /// Dry drag of the output seal: (explicit torque, N·m; coefficient to be taken implicitly, N·m·s/rad).
+    #[inline]
+    fn seal(&self) -> (f64, f64) {
+        /// Its reversal is spread over this speed, rad/s.
+        const CREEP_RAD_PER_S: f64 = 1e-3;
+        let (drag_nm, speed) = (self.spec.shafts.seal_drag_nm, self.chain.v[DISC]);
+        if speed.abs() > CREEP_RAD_PER_S { (drag_nm.copysign(speed), 0.0) } else { (0.0, drag_nm / CREEP_RAD_PER_S) }
+    }
+
+    /// The rig is new again from now on: the housing cold, the teeth unworn.
+    pub fn renew(&mut self) {
+        self.warming_since_s = self.time_s();
+        self.wear_mm = 0.0;
     }
 
     /// Simulated time since the start, s.
@@ -280,9 +347,10 @@ impl Plant {
             mesh_torque_nm: chain.mesh_torque_nm,
             load_torque_nm: chain.load_torque_nm,
             brake_torque_nm: chain.brake_torque_nm,
-            input_windup_rad: chain.q[INPUT] - chain.q[GEAR1],
+            input_windup_rad: chain.input_twist_rad(),
             output_windup_rad: chain.output_twist_rad(self.clamp_slip_rad),
             clamp_slip_rad: self.clamp_slip_rad,
+            count_losses: self.count_losses,
             transmission_error_rad: chain.q[DISC] - self.curves.driven_angle(chain.q[INPUT]),
             contact: chain.contact,
         }
@@ -363,6 +431,8 @@ fn chain_spec(spec: &PlantSpec) -> ChainSpec {
         let stiffness_nm_per_rad = 1.0 / compliance_rad_per_nm.max(RIGID_SHAFT_RAD_PER_NM);
         Spring { stiffness_nm_per_rad, damping_nm_s_per_rad: damping_time_s * stiffness_nm_per_rad }
     };
+    let joint =
+        |angle_rad: f64, phase_rad: f64| (angle_rad != 0.0).then(|| ((0.5 * angle_rad).tan().powi(2), phase_rad));
     let step_up = spec.brake.step_up;
     let mut inertia_kg_m2 = [0.0; 5];
     inertia_kg_m2[INPUT] = spec.drive.inertia_kg_m2;
@@ -376,7 +446,7 @@ fn chain_spec(spec: &PlantSpec) -> ChainSpec {
         input_shaft: spring(shafts.compliance_input_rad_per_nm, shafts.damping_time_s),
         output_shaft: spring(shafts.compliance_output_rad_per_nm, shafts.damping_time_s),
         brake_coupling: spring(shafts.compliance_brake_rad_per_nm, shafts.brake_damping_time_s),
-        cardan: (shafts.output_cardan_angle_rad != 0.0)
-            .then(|| ((0.5 * shafts.output_cardan_angle_rad).tan().powi(2), shafts.output_cardan_phase_rad)),
+        cardan: joint(shafts.output_cardan_angle_rad, shafts.output_cardan_phase_rad),
+        input_cardan: joint(shafts.input_cardan_angle_rad, shafts.input_cardan_phase_rad),
     }
 }

@@ -18,24 +18,31 @@ pub struct NoiseSpec {
     pub run_out_rms_mm: f64,
     /// Correlation length of the run-out in driver revolutions.
     pub run_out_correlation_rev: f64,
+    /// Slower run-out, which varies from run to run, mm RMS.
+    pub slow_run_out_rms_mm: f64,
+    /// Its correlation length in driver revolutions.
+    pub slow_run_out_correlation_rev: f64,
 }
 
 impl Default for NoiseSpec {
     fn default() -> Self {
-        Self { run_out_rms_mm: 7.25e-5, run_out_correlation_rev: 0.3 }
+        Self {
+            run_out_rms_mm: 7.25e-5,
+            run_out_correlation_rev: 0.3,
+            slow_run_out_rms_mm: 0.0,
+            slow_run_out_correlation_rev: 5.0,
+        }
     }
 }
 
 impl NoiseSpec {
     pub(super) fn validate(&self) -> Result<(), PlantError> {
-        in_range("noise.run_out_rms_mm", self.run_out_rms_mm, "mm", (0.0, 0.1), "RMS along the pitch line")?;
-        in_range(
-            "noise.run_out_correlation_rev",
-            self.run_out_correlation_rev,
-            "rev",
-            (1e-3, 1e3),
-            "driver revolutions",
-        )
+        let (size, length) = ((0.0, 0.1), (1e-3, 1e3));
+        in_range("noise.run_out_rms_mm", self.run_out_rms_mm, "mm", size, "RMS along the pitch line")?;
+        in_range("noise.slow_run_out_rms_mm", self.slow_run_out_rms_mm, "mm", size, "RMS along the pitch line")?;
+        in_range("noise.run_out_correlation_rev", self.run_out_correlation_rev, "rev", length, "driver revolutions")?;
+        let slow = self.slow_run_out_correlation_rev;
+        in_range("noise.slow_run_out_correlation_rev", slow, "rev", length, "driver revolutions")
     }
 }
 
@@ -53,16 +60,17 @@ pub(super) struct RunOut {
 }
 
 impl RunOut {
-    pub fn new(spec: &NoiseSpec, mut rng: Pcg64Mcg) -> Self {
+    /// A process of this size that remembers itself over `correlation_rev` driver revolutions.
+    pub fn new(rms_mm: f64, correlation_rev: f64, mut rng: Pcg64Mcg) -> Self {
         let keep = (-1.0 / KNOTS).exp();
         let renew = (1.0 - keep * keep).sqrt();
         let draw: f64 = StandardNormal.sample(&mut rng);
-        let start = spec.run_out_rms_mm * draw;
+        let start = rms_mm * draw;
         Self {
-            rms_mm: spec.run_out_rms_mm,
+            rms_mm,
             keep,
             renew,
-            knots_per_rad: KNOTS / (TAU * spec.run_out_correlation_rev),
+            knots_per_rad: KNOTS / (TAU * correlation_rev),
             from_mm: start,
             to_mm: start,
             progress: 0.0,
@@ -91,7 +99,7 @@ mod tests {
 
     #[test]
     fn the_process_has_its_size_and_its_memory() {
-        let mut process = RunOut::new(&NoiseSpec::default(), Pcg64Mcg::seed_from_u64(9));
+        let mut process = RunOut::new(7.25e-5, 0.3, Pcg64Mcg::seed_from_u64(9));
         let step = TAU / 100.0;
         let values: Vec<f64> = (0..400_000).map(|_| process.advance(step)).collect();
         let variance = values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
@@ -102,7 +110,7 @@ mod tests {
 
     #[test]
     fn at_rest_nothing_moves() {
-        let mut process = RunOut::new(&NoiseSpec::default(), Pcg64Mcg::seed_from_u64(9));
+        let mut process = RunOut::new(7.25e-5, 0.3, Pcg64Mcg::seed_from_u64(9));
         let first = process.advance(0.4);
         assert_eq!(process.advance(0.0), first);
     }

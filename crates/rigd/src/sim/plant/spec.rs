@@ -4,10 +4,12 @@ use super::brake::BrakeSpec;
 use super::encoder::EncodersSpec;
 use super::error::{PlantError, in_range};
 use super::geometry::GearSpec;
-use super::mesh::{HousingSpec, MeshSpec};
+use super::mesh::{BearingSpec, HousingSpec, MeshSpec};
+use super::oddity::Oddity;
 use super::run_out::NoiseSpec;
 use super::servo::DriveSpec;
 use super::slippage::ClampSpec;
+use super::teeth::ToothSpec;
 
 /// Default compliance of the shaft from the input encoder to gear 1, rad/(N·m).
 pub const DEFAULT_SHAFT_COMPLIANCE_INPUT_RAD_PER_NM: f64 = 5e-6;
@@ -39,6 +41,12 @@ pub struct ShaftSpec {
     pub output_cardan_angle_rad: f64,
     /// Phase of the joint, rad: to first order the output gains tan²(β/2) sin(2θ2 − phase).
     pub output_cardan_phase_rad: f64,
+    /// Angle of a Cardan joint in the input shaft, between encoder and gear 1, rad; 0 is a straight coupling.
+    pub input_cardan_angle_rad: f64,
+    /// Phase of the joint, rad: to first order gear 1 gains tan²(β/2) sin(2θ1 − phase).
+    pub input_cardan_phase_rad: f64,
+    /// Dry drag of the seal at the output encoder, N·m: twists every shaft before it and is no load that the brake knows.
+    pub seal_drag_nm: f64,
 }
 
 impl Default for ShaftSpec {
@@ -55,6 +63,9 @@ impl Default for ShaftSpec {
             bearing_nm_s_per_rad: 1e-3,
             output_cardan_angle_rad: 0.0,
             output_cardan_phase_rad: 0.0,
+            input_cardan_angle_rad: 0.0,
+            input_cardan_phase_rad: 0.0,
+            seal_drag_nm: 0.0,
         }
     }
 }
@@ -91,14 +102,12 @@ impl ShaftSpec {
         in_range("shafts.gear2_inertia_kg_m2", self.gear2_inertia_kg_m2, "kg·m²", inertia, "of gear 2")?;
         in_range("shafts.disc_inertia_kg_m2", self.disc_inertia_kg_m2, "kg·m²", inertia, "of the disc and its shaft")?;
         in_range("shafts.bearing_nm_s_per_rad", self.bearing_nm_s_per_rad, "N·m·s/rad", (0.0, 100.0), "viscous")?;
-        in_range("shafts.output_cardan_angle_rad", self.output_cardan_angle_rad, "rad", (-0.5, 0.5), "under 0.5 rad")?;
-        in_range(
-            "shafts.output_cardan_phase_rad",
-            self.output_cardan_phase_rad,
-            "rad",
-            (-1e6, 1e6),
-            "give a finite angle",
-        )
+        let (bent, phase) = ((-0.5, 0.5), (-1e6, 1e6));
+        in_range("shafts.output_cardan_angle_rad", self.output_cardan_angle_rad, "rad", bent, "under 0.5 rad")?;
+        in_range("shafts.output_cardan_phase_rad", self.output_cardan_phase_rad, "rad", phase, "give a finite angle")?;
+        in_range("shafts.input_cardan_angle_rad", self.input_cardan_angle_rad, "rad", bent, "under 0.5 rad")?;
+        in_range("shafts.input_cardan_phase_rad", self.input_cardan_phase_rad, "rad", phase, "give a finite angle")?;
+        in_range("shafts.seal_drag_nm", self.seal_drag_nm, "N·m", (0.0, 20.0), "dry drag at the output encoder")
     }
 }
 
@@ -109,6 +118,10 @@ pub struct PlantSpec {
     pub gears: GearSpec,
     /// Stiffness of the teeth.
     pub mesh: MeshSpec,
+    /// Errors, damage and wear of the teeth.
+    pub teeth: ToothSpec,
+    /// Bearings that give way or have play.
+    pub bearings: BearingSpec,
     /// Servo drive.
     pub drive: DriveSpec,
     /// Shafts and inertias.
@@ -123,6 +136,8 @@ pub struct PlantSpec {
     pub clamp: ClampSpec,
     /// Housing that may grow.
     pub housing: HousingSpec,
+    /// Displacements of the output's reading that no known effect makes.
+    pub oddities: Vec<Oddity>,
 }
 
 impl PlantSpec {
@@ -132,6 +147,7 @@ impl PlantSpec {
         self.encoders.input.noise_rad = 0.0;
         self.encoders.output.noise_rad = 0.0;
         self.noise.run_out_rms_mm = 0.0;
+        self.noise.slow_run_out_rms_mm = 0.0;
         self.brake.stick_slip_ratio = 0.0;
         self.drive.ripple.clear();
         self
@@ -144,6 +160,9 @@ impl PlantSpec {
     pub fn validate(&self) -> Result<(), PlantError> {
         self.gears.validate()?;
         self.mesh.validate()?;
+        self.teeth.validate(&self.gears, self.mesh.compliance_mm2_rad_per_nm)?;
+        self.bearings.validate()?;
+        self.oddities.iter().try_for_each(Oddity::validate)?;
         self.drive.validate()?;
         self.shafts.validate()?;
         self.brake.validate()?;

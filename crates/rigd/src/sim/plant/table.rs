@@ -31,6 +31,8 @@ pub(super) struct Place {
     t: f64,
     /// θ1 times the mean ratio.
     base_rad: f64,
+    /// θ1 itself.
+    pub theta1_rad: f64,
 }
 
 /// Geometry of one flank at one place.
@@ -42,6 +44,8 @@ pub(super) struct FlankState {
     pub ratio: f64,
     /// Squared lever arm about the driven axis, mm².
     pub arm_squared_mm2: f64,
+    /// Compliance of the teeth that touch, mm²·rad/(N·m); the mesh knows it.
+    pub compliance_mm2_rad_per_nm: f64,
 }
 
 /// Contact of both flanks over the period of the pair.
@@ -170,7 +174,7 @@ impl ContactTable {
         let within = (turns - floor(turns)) * self.cells_f64;
         // Rounding may put an angle just under a whole turn on the turn itself.
         let cell = (within as usize).min(self.cells.len() - 1);
-        Place { cell, t: within - cell as f64, base_rad: self.mean_ratio * theta1 }
+        Place { cell, t: within - cell as f64, base_rad: self.mean_ratio * theta1, theta1_rad: theta1 }
     }
 
     /// Geometry of `flank` at `place`.
@@ -184,6 +188,7 @@ impl ContactTable {
             psi_rad: place.base_rad + (c0 + t * (c1 + t * (c2 + t * c3))),
             ratio: self.mean_ratio + (c1 + t * (2.0 * c2 + t * 3.0 * c3)) * self.cells_per_rad,
             arm_squared_mm2: cell.arm2_squared[side][0] + t * cell.arm2_squared[side][1],
+            compliance_mm2_rad_per_nm: 0.0,
         }
     }
 

@@ -4,10 +4,9 @@ use super::*;
 use std::f64::consts::TAU;
 
 /// A quiet rig with the effect `name`.
-fn with(name: &str) -> PlantSpec {
-    let (.., apply) = UNDOCUMENTED.iter().find(|(known, ..)| *known == name).unwrap();
+pub(super) fn with(name: &str) -> PlantSpec {
     let mut spec = PlantSpec::default().quiet();
-    apply(&mut spec);
+    undocumented::find(name).unwrap().apply_usual(&mut spec);
     spec
 }
 
@@ -19,20 +18,21 @@ fn measured_curve(spec: &PlantSpec, driver_rpm: f64, current_a: f64) -> Vec<(f64
         plant.step();
     }
     let (input, output) = (plant.input_index_counts().unwrap(), plant.output_index_counts().unwrap());
+    let nominal = geometry::PitchCurves::new(&GearSpec::default());
     (0..240)
         .map(|_| {
             run(&mut plant, 0.25 / driver_rpm.abs());
             let sample = plant.step();
             let theta1 = TAU * (sample.input_counts - input) as f64 / 7.2e6;
             let theta2 = TAU * (sample.output_counts - output) as f64 / 7.2e6;
-            let error = theta2 - plant.nominal_driven_rad(theta1);
+            let error = theta2 - nominal.driven_angle(theta1);
             (theta1, error - TAU * (error / TAU).round())
         })
         .collect()
 }
 
 /// Largest difference between what the effect adds and `expected(θ1)`, with the same drive on both rigs.
-fn mismatch(name: &str, driver_rpm: f64, expected: impl Fn(&Plant, f64) -> f64) -> f64 {
+pub(super) fn mismatch(name: &str, driver_rpm: f64, expected: impl Fn(&Plant, f64) -> f64) -> f64 {
     let spec = with(name);
     let nominal = PlantSpec::default().quiet();
     let plant = Plant::new(&nominal, 10_000.0, 11).unwrap();
@@ -58,6 +58,24 @@ fn encoder_errors_read_sines_of_their_order() {
     assert!(mismatch("encoder1_ellipticity", 5.0, input(2.0, 3e-5, 0.8)) < 4e-6);
     let cardan = 0.007f64.tan().powi(2);
     assert!(mismatch("coupling_misalignment_output", 5.0, output(2.0, cardan, 0.5)) < 4e-6);
+    assert!(mismatch("coupling_misalignment_input", 5.0, input(2.0, -cardan, 1.7)) < 4e-6);
+}
+
+#[test]
+fn gear_one_ahead_of_its_index_leads_with_the_ratio() {
+    for rpm in [5.0, -5.0] {
+        assert!(mismatch("phasing_error", rpm, |plant, theta1| 5e-5 * plant.nominal_ratio(theta1)) < 4e-6);
+    }
+}
+
+#[test]
+fn another_pitch_curve_is_another_transmission_function() {
+    // ∂f/∂k = 2 sin θ1/(1 − 2k cos θ1 + k²), from f = θ1 + 2 atan(k sin θ1/(1 − k cos θ1)).
+    let k = GearSpec::default().eccentricity;
+    let shift = |_: &Plant, theta1: f64| 3e-5 * 2.0 * theta1.sin() / (1.0 - 2.0 * k * theta1.cos() + k * k);
+    for rpm in [5.0, -5.0] {
+        assert!(mismatch("pitch_curve_error", rpm, shift) < 4e-6);
+    }
 }
 
 #[test]

@@ -1,8 +1,10 @@
 //! The whole rig: statics, motion, limits, effects.
 
+mod drive_train;
 mod effects;
 mod motion;
 mod statics;
+mod tooth_errors;
 
 use super::*;
 

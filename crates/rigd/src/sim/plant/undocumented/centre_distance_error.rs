@@ -1,8 +1,28 @@
-//! The housing was bored, or the slide set, with a larger centre distance than the pair closes at.
+//! The housing was bored, or the slide set, with another centre distance than the pair closes at.
 
-use super::super::PlantSpec;
+use super::{Dice, Parameters, PlantSpec, Undocumented};
+
+/// The effect.
+pub const EFFECT: Undocumented = Undocumented {
+    name: "centre_distance_error",
+    summary: "centre distance 30 µm too large",
+    usual,
+    draw,
+    amounts: &[("da_mm", 1.0)],
+    develops: false,
+    apply,
+};
 
 /// Moves the gears 30 µm apart.
-pub fn apply(spec: &mut PlantSpec) {
-    spec.gears.centre_distance_error_mm += 0.03;
+fn usual(_: &PlantSpec) -> Parameters {
+    Parameters::of(&[("da_mm", 0.03)])
+}
+
+/// Either sign.
+fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
+    Parameters::of(&[("da_mm", 0.03 * dice.sign())])
+}
+
+fn apply(spec: &mut PlantSpec, parameters: &Parameters) {
+    spec.gears.centre_distance_error_mm += parameters.number("da_mm");
 }

@@ -1,9 +1,29 @@
 //! The input encoder's disc was clamped out of round.
 
-use super::super::PlantSpec;
+use super::{Dice, Parameters, PlantSpec, Undocumented};
+
+/// The effect.
+pub const EFFECT: Undocumented = Undocumented {
+    name: "encoder1_ellipticity",
+    summary: "input encoder's disc out of round by 3e-5",
+    usual,
+    draw,
+    amounts: &[("eps", 1.0)],
+    develops: false,
+    apply,
+};
 
 /// Squeezes the disc: (b − a)/(b + a) of its half axes becomes 3e-5.
-pub fn apply(spec: &mut PlantSpec) {
-    spec.encoders.input.ellipticity = 3e-5;
-    spec.encoders.input.ellipticity_phase_rad = 0.8;
+fn usual(_: &PlantSpec) -> Parameters {
+    Parameters::of(&[("eps", 3e-5), ("phase_rad", 0.8)])
+}
+
+/// Random in all but the size.
+fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
+    Parameters::of(&[("eps", 3e-5), ("phase_rad", dice.angle())])
+}
+
+fn apply(spec: &mut PlantSpec, parameters: &Parameters) {
+    let disc = &mut spec.encoders.input;
+    (disc.ellipticity, disc.ellipticity_phase_rad) = (parameters.number("eps"), parameters.number("phase_rad"));
 }

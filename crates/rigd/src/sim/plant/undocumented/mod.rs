@@ -1,50 +1,118 @@
-//! Effects that the plant can have and the nominal model does not know. One file each: what it is, and how it enters
-//! the plant.
+//! Effects that the plant can have and the nominal model does not know. One file each: what it is, its usual size, how it is drawn,
+//! and how it enters the plant.
 //!
-//! Sizes are those of a rig in need of attention: well above the noise, well below what one would see by eye. A new
-//! effect is a file and a line in [`UNDOCUMENTED`].
+//! Usual sizes are those of a rig in need of attention: well above the noise, well below what one would see by eye. Names, parameters,
+//! signs and phases are those under which the diagnosis reports them. A new effect is a file and a line in [`UNDOCUMENTED`]; what the
+//! diagnosis shall not know by name goes into [`outside`].
 
 use super::PlantSpec;
 
 pub mod backlash_error;
+pub mod bearing_clearance;
+pub mod bearing_compliance;
+pub mod brake_torque_ripple;
 pub mod centre_distance_error;
 pub mod count_loss;
+pub mod coupling_misalignment_input;
 pub mod coupling_misalignment_output;
+mod dice;
 pub mod encoder1_eccentricity;
 pub mod encoder1_ellipticity;
+pub mod encoder1_interpolation;
 pub mod encoder2_eccentricity;
 pub mod encoder2_ellipticity;
+pub mod encoder2_interpolation;
+pub mod friction_windup;
 pub mod gear1_eccentricity;
 pub mod gear2_eccentricity;
 pub mod mesh_compliance;
+pub mod mesh_stiffness_variation;
+pub mod outside;
+mod parameters;
+pub mod phasing_error;
+pub mod pitch_curve_error;
+pub mod pitch_errors;
+pub mod profile_error;
 pub mod shaft_compliance_input;
 pub mod shaft_compliance_output;
 pub mod slip;
 pub mod thermal_drift;
 pub mod time_skew;
+pub mod tooth_damage;
+pub mod torsional_resonance;
+pub mod wear_drift;
 
-/// Name, one-line summary with the size, and what puts the effect into a specification.
-pub type Undocumented = (&'static str, &'static str, fn(&mut PlantSpec));
+pub use dice::Dice;
+pub use outside::OUTSIDE;
+pub use parameters::{Parameters, Value};
 
-/// All effects, by the names under which the diagnosis knows them.
+/// An effect of the plant.
+#[derive(Debug, Clone, Copy)]
+pub struct Undocumented {
+    /// The name under which the diagnosis knows it.
+    pub name: &'static str,
+    /// A line with its usual size.
+    pub summary: &'static str,
+    /// Its parameters at the usual size on a plant.
+    pub usual: fn(&PlantSpec) -> Parameters,
+    /// Its parameters about the usual size, phases and places at random.
+    pub draw: fn(&PlantSpec, &mut Dice) -> Parameters,
+    /// The parameters that carry its size, and the power of the size with which each goes.
+    pub amounts: &'static [(&'static str, f64)],
+    /// Whether what it adds changes from revolution to revolution.
+    pub develops: bool,
+    /// Puts it into a plant.
+    pub apply: fn(&mut PlantSpec, &Parameters),
+}
+
+impl Undocumented {
+    /// Puts the effect into a plant at its usual size.
+    pub fn apply_usual(&self, spec: &mut PlantSpec) {
+        let parameters = (self.usual)(spec);
+        (self.apply)(spec, &parameters);
+    }
+}
+
+/// All effects that the diagnosis knows.
 pub const UNDOCUMENTED: &[Undocumented] = &[
-    ("gear1_eccentricity", "gear 1 sits 11 µm off the documented centre", gear1_eccentricity::apply),
-    ("gear2_eccentricity", "gear 2 sits 11 µm off the documented centre", gear2_eccentricity::apply),
-    ("centre_distance_error", "centre distance 30 µm too large", centre_distance_error::apply),
-    ("backlash_error", "teeth 20 µm thinner than documented", backlash_error::apply),
-    ("encoder1_eccentricity", "input encoder's disc off centre by 4e-5 of its radius", encoder1_eccentricity::apply),
-    ("encoder2_eccentricity", "output encoder's disc off centre by 4e-5 of its radius", encoder2_eccentricity::apply),
-    ("encoder1_ellipticity", "input encoder's disc out of round by 3e-5", encoder1_ellipticity::apply),
-    ("encoder2_ellipticity", "output encoder's disc out of round by 3e-5", encoder2_ellipticity::apply),
-    ("shaft_compliance_input", "input shaft softer by 4e-6 rad/(N·m)", shaft_compliance_input::apply),
-    ("shaft_compliance_output", "output shaft softer by 6e-6 rad/(N·m)", shaft_compliance_output::apply),
-    ("mesh_compliance", "mesh softer by 0.03 mm²·rad/(N·m)", mesh_compliance::apply),
-    ("slip", "output clamp creeps 4 µrad per revolution and N·m above 4 N·m", slip::apply),
-    ("count_loss", "output counter loses 24 counts about every 1.4 revolutions", count_loss::apply),
-    ("time_skew", "output latched 60 µs late", time_skew::apply),
-    ("thermal_drift", "centre distance grows 20 µm within minutes", thermal_drift::apply),
-    ("coupling_misalignment_output", "output coupling bent by 0.8°", coupling_misalignment_output::apply),
+    gear1_eccentricity::EFFECT,
+    gear2_eccentricity::EFFECT,
+    centre_distance_error::EFFECT,
+    backlash_error::EFFECT,
+    pitch_curve_error::EFFECT,
+    phasing_error::EFFECT,
+    pitch_errors::EFFECT,
+    profile_error::EFFECT,
+    tooth_damage::EFFECT,
+    encoder1_eccentricity::EFFECT,
+    encoder2_eccentricity::EFFECT,
+    encoder1_ellipticity::EFFECT,
+    encoder2_ellipticity::EFFECT,
+    encoder1_interpolation::EFFECT,
+    encoder2_interpolation::EFFECT,
+    coupling_misalignment_input::EFFECT,
+    coupling_misalignment_output::EFFECT,
+    time_skew::EFFECT,
+    count_loss::EFFECT,
+    shaft_compliance_input::EFFECT,
+    shaft_compliance_output::EFFECT,
+    mesh_compliance::EFFECT,
+    bearing_compliance::EFFECT,
+    mesh_stiffness_variation::EFFECT,
+    bearing_clearance::EFFECT,
+    friction_windup::EFFECT,
+    slip::EFFECT,
+    brake_torque_ripple::EFFECT,
+    torsional_resonance::EFFECT,
+    thermal_drift::EFFECT,
+    wear_drift::EFFECT,
 ];
+
+/// The effect of this name, within the library or outside it.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static Undocumented> {
+    UNDOCUMENTED.iter().chain(OUTSIDE).find(|effect| effect.name == name)
+}
 
 #[cfg(test)]
 mod tests {
@@ -53,21 +121,50 @@ mod tests {
 
     #[test]
     fn every_effect_changes_the_plant_and_leaves_it_buildable() {
-        for (name, summary, apply) in UNDOCUMENTED {
+        for effect in UNDOCUMENTED.iter().chain(OUTSIDE) {
             let mut spec = PlantSpec::default();
-            apply(&mut spec);
-            assert_ne!(spec, PlantSpec::default(), "{name}");
-            assert!(!summary.is_empty());
-            assert!(Plant::new(&spec, 10_000.0, 1).is_ok(), "{name}");
+            effect.apply_usual(&mut spec);
+            assert_ne!(spec, PlantSpec::default(), "{}", effect.name);
+            assert!(!effect.summary.is_empty());
+            assert!(Plant::new(&spec, 10_000.0, 1).is_ok(), "{}", effect.name);
+            let mut drawn = PlantSpec::default();
+            let parameters = (effect.draw)(&drawn, &mut Dice::new(5));
+            (effect.apply)(&mut drawn, &parameters);
+            assert!(Plant::new(&drawn, 10_000.0, 1).is_ok(), "{}", effect.name);
+        }
+    }
+
+    #[test]
+    fn no_amount_is_no_effect() {
+        for effect in UNDOCUMENTED.iter().chain(OUTSIDE) {
+            // A count cannot be lost by halves, a coupling cannot be infinitely stiff.
+            if ["count_loss", "torsional_resonance"].contains(&effect.name) {
+                continue;
+            }
+            let spec = PlantSpec::default().quiet();
+            let mut none = spec.clone();
+            (effect.apply)(&mut none, &(effect.usual)(&spec).scaled(effect.amounts, 1e-12));
+            let samples = |spec: &PlantSpec| {
+                let mut plant = Plant::new(spec, 1000.0, 1).unwrap();
+                plant.set_enabled(true);
+                plant.set_speed_reference_rpm(100.0);
+                plant.set_drive(true, 0.4, 60.0);
+                let truth = |plant: &Plant| plant.truth().transmission_error_rad;
+                (0..3000).map(|_| (plant.step(), truth(&plant))).last()
+            };
+            let ((a, te_a), (b, te_b)) = (samples(&spec).unwrap(), samples(&none).unwrap());
+            assert!((te_a - te_b).abs() < 1e-9, "{}: {te_a} {te_b}", effect.name);
+            assert!((a.output_counts - b.output_counts).abs() <= 1, "{}", effect.name);
         }
     }
 
     #[test]
     fn names_are_unique_and_effects_combine() {
         let mut spec = PlantSpec::default();
-        for (n, (name, _, apply)) in UNDOCUMENTED.iter().enumerate() {
-            assert!(UNDOCUMENTED[..n].iter().all(|(other, ..)| other != name));
-            apply(&mut spec);
+        let all: Vec<&Undocumented> = UNDOCUMENTED.iter().chain(OUTSIDE).collect();
+        for (n, effect) in all.iter().enumerate() {
+            assert!(all[..n].iter().all(|other| other.name != effect.name));
+            effect.apply_usual(&mut spec);
         }
         assert!(Plant::new(&spec, 10_000.0, 1).is_ok());
     }

@@ -1,8 +1,28 @@
 //! The output encoder is latched later than the input: two readers with a clock each, or a filter in one of them.
 
-use super::super::PlantSpec;
+use super::{Dice, Parameters, PlantSpec, Undocumented};
+
+/// The effect.
+pub const EFFECT: Undocumented = Undocumented {
+    name: "time_skew",
+    summary: "output latched 60 µs late",
+    usual,
+    draw,
+    amounts: &[("dt_s", 1.0)],
+    develops: false,
+    apply,
+};
 
 /// Latches the output 60 µs late, 31 µrad at 5 rpm and a ratio of 1.
-pub fn apply(spec: &mut PlantSpec) {
-    spec.encoders.time_skew_s = 60e-6;
+fn usual(_: &PlantSpec) -> Parameters {
+    Parameters::of(&[("dt_s", 60e-6)])
+}
+
+/// Either sign.
+fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
+    Parameters::of(&[("dt_s", 60e-6 * dice.sign())])
+}
+
+fn apply(spec: &mut PlantSpec, parameters: &Parameters) {
+    spec.encoders.time_skew_s += parameters.number("dt_s");
 }

@@ -1,0 +1,36 @@
+//! A hub works loose: an error of six waves a turn grows with time.
+
+use super::super::{Dice, Parameters, PlantSpec, Undocumented};
+use crate::sim::plant::{Carrier, Oddity, Weight};
+
+/// The effect.
+pub const EFFECT: Undocumented = Undocumented {
+    name: "growing_wobble",
+    summary: "hub works loose, six waves a turn growing with time",
+    usual,
+    draw,
+    amounts: &[("a_rad", 1.0)],
+    develops: true,
+    apply,
+};
+
+/// A size that shows.
+fn usual(_: &PlantSpec) -> Parameters {
+    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", 0.6)])
+}
+
+/// Random in all but the size.
+fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
+    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", dice.angle())])
+}
+
+fn apply(spec: &mut PlantSpec, parameters: &Parameters) {
+    spec.oddities.push(Oddity::Wave {
+        carrier: Carrier::Output,
+        order: 6.0,
+        amplitude_rad: parameters.number("a_rad"),
+        phase_rad: parameters.number("phase_rad"),
+        weight: Weight::Age(300.0),
+        square: false,
+    });
+}
