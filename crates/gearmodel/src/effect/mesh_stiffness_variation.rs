@@ -46,11 +46,15 @@ impl Effect for MeshStiffnessVariation {
         shapes
     }
 
+    fn sharp(&self) -> bool {
+        true
+    }
+
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
         let weight = if let [duty, start] = shape[..] {
             if (at.pitches - start).rem_euclid(1.0) < duty { 1.0 - duty } else { -duty }
         } else {
-            rig.single_pair_share(at) - rig.single_pair_duty(at)
+            f64::from(u8::from(rig.teeth_in_contact(at).count() < 2)) - rig.single_pair_duty(at)
         };
         row[0] = -at.sense * at.load_nm * weight / (at.arm_mm * at.arm_mm);
     }

@@ -146,6 +146,11 @@ pub trait Effect: Sync {
         false
     }
 
+    /// True where the trace jumps with the teeth: it is then averaged over an angle bin, as the samples are.
+    fn sharp(&self) -> bool {
+        false
+    }
+
     /// True where a negative amplitude has no meaning.
     fn one_sided(&self) -> bool {
         false

@@ -64,6 +64,10 @@ impl Effect for PitchErrors {
         Some(table(beta, teeth(rig)))
     }
 
+    fn sharp(&self) -> bool {
+        true
+    }
+
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
         let teeth = teeth(rig);
         let side = usize::from(at.sense < 0.0);

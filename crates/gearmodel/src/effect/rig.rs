@@ -8,8 +8,10 @@ use crate::increment::common_normal;
 use crate::pitch_curve::AnyCurve;
 use crate::{Direction, Errors, GearPair, NominalModel};
 
-/// Angles a turn at which the teeth in contact are tabulated.
-const ZONE_STEPS: usize = 2880;
+/// Angles a turn at which the teeth in contact are looked up before their ends are refined.
+const ZONE_STEPS: usize = 720;
+/// Halvings of an angle step until the end of a contact is known, to 0.002°.
+const HALVINGS: usize = 8;
 
 /// A nominal model and what was noted about its encoders.
 #[derive(Clone, Debug)]
@@ -19,10 +21,8 @@ pub struct Rig {
     pub lines: [Option<f64>; 2],
     /// Counts a revolution of the output encoder, where known or seen in the data.
     pub output_counts_per_rev: Option<f64>,
-    /// Driver teeth in contact over one turn, by sense: up to three, ending with none.
-    zone: [Vec<[Option<u16>; 3]>; 2],
-    /// Share of the rolled arc on which one pair alone carries, by sense.
-    duty: [f64; 2],
+    /// From where to where each driver tooth's flank is in contact, pitches from its pitch point, by sense.
+    spans: [Vec<Span>; 2],
     pitch_mm: f64,
 }
 
@@ -30,23 +30,9 @@ impl Rig {
     /// A rig of a nominal model.
     #[must_use]
     pub fn new(model: NominalModel, lines: [Option<f64>; 2], output_counts_per_rev: Option<f64>) -> Self {
-        let zone = zones(&model.pair);
+        let spans = spans(&model.pair);
         let pitch_mm = model.pair.pitch_mm().unwrap_or(f64::NAN);
-        // Weighted by the rolled arc, so that a pitch counts as a pitch wherever it lies.
-        let duty = [0, 1].map(|side: usize| {
-            let steps = zone[side].len().max(1);
-            let (mut single, mut all) = (0.0, 0.0);
-            for (step, entry) in zone[side].iter().enumerate() {
-                let at = model.pair.at(TAU * (step as f64 + 0.5) / steps as f64);
-                let arc = at.r1_mm / at.mu_rad.cos();
-                all += arc;
-                if entry.iter().flatten().count() < 2 {
-                    single += arc;
-                }
-            }
-            if all > 0.0 { single / all } else { 0.0 }
-        });
-        Self { model, lines, output_counts_per_rev, zone, duty, pitch_mm }
+        Self { model, lines, output_counts_per_rev, spans, pitch_mm }
     }
 
     /// The pair.
@@ -91,34 +77,36 @@ impl Rig {
             pressure_rad,
             arm_mm: at.r2_mm * pressure_rad.cos(),
             pitches,
+            pitches_per_rad: if self.pair().has_teeth() { at.r1_mm / (at.mu_rad.cos() * self.pitch_mm) } else { 0.0 },
             ..Station::default()
         }
     }
 
     /// Driver teeth in nominal contact.
     pub fn teeth_in_contact(&self, at: &Station) -> impl Iterator<Item = usize> + '_ {
-        let side = usize::from(at.sense < 0.0);
-        let step = ((at.theta1_rad / TAU).rem_euclid(1.0) * ZONE_STEPS as f64) as usize;
-        let entry = self.zone[side].get(step.min(ZONE_STEPS - 1)).copied().unwrap_or_default();
-        entry.into_iter().flatten().map(usize::from)
+        let spans = &self.spans[usize::from(at.sense < 0.0)];
+        let (pitches, near, teeth) = (at.pitches, at.pitches.floor() as i64, spans.len() as i64);
+        (near - 1..=near + 2).filter_map(move |tooth| {
+            let index = usize::try_from(tooth.checked_rem_euclid(teeth)?).ok()?;
+            let from_pitch_point = pitches - tooth as f64;
+            let span = spans[index];
+            (span.from <= from_pitch_point && from_pitch_point <= span.to).then_some(index)
+        })
     }
 
-    /// Whether one pair alone carries there, 0 or 1.
-    #[must_use]
-    pub fn single_pair_share(&self, at: &Station) -> f64 {
-        f64::from(u8::from(self.teeth_in_contact(at).count() < 2))
-    }
-
-    /// Share of the pitch about a station on which one pair alone carries: its mean over the turn of the driver's sense.
+    /// Share of the pitch about a station on which one pair alone carries: two less the contact ratio.
     #[must_use]
     pub fn single_pair_duty(&self, at: &Station) -> f64 {
-        self.duty[usize::from(at.sense < 0.0)]
+        let spans = &self.spans[usize::from(at.sense < 0.0)];
+        let nearest = (at.pitches.round() as i64).checked_rem_euclid(spans.len() as i64);
+        nearest.and_then(|n| spans.get(n as usize)).map_or(0.0, Span::single_pair_duty)
     }
 
-    /// The same, both senses together.
+    /// The same in the mean over all teeth and both senses.
     #[must_use]
     pub fn mean_single_pair_duty(&self) -> f64 {
-        0.5 * (self.duty[0] + self.duty[1])
+        let all: Vec<f64> = self.spans.iter().flatten().map(Span::single_pair_duty).collect();
+        all.iter().sum::<f64>() / all.len().max(1) as f64
     }
 
     /// Compliance of the whole train at the driven encoder, rad/(N·m): C_out + C_in i² + C_mesh/A²; 1 rad/(N·m) at the output
@@ -138,23 +126,55 @@ impl Rig {
     }
 }
 
-fn zones(pair: &GearPair) -> [Vec<[Option<u16>; 3]>; 2] {
-    let Ok(contact) = ContactModel::new(pair.clone(), &Errors::default()) else { return [Vec::new(), Vec::new()] };
-    let teeth = i64::from(pair.teeth().0.max(1));
+/// A stretch of contact, pitches from the pitch point.
+#[derive(Clone, Copy, Debug, Default)]
+struct Span {
+    from: f64,
+    to: f64,
+}
+
+impl Span {
+    fn single_pair_duty(&self) -> f64 {
+        (2.0 - (self.to - self.from)).clamp(0.0, 1.0)
+    }
+}
+
+/// Contact of every driver tooth's flank, by sense; empty where there are no teeth.
+fn spans(pair: &GearPair) -> [Vec<Span>; 2] {
+    let contact = ContactModel::new(pair.clone(), &Errors::default()).ok();
+    let teeth = i64::from(pair.teeth().0);
     Direction::BOTH.map(|direction| {
-        (0..ZONE_STEPS)
-            .map(|step| {
-                let theta1_rad = TAU * (step as f64 + 0.5) / ZONE_STEPS as f64;
-                let mut entry = [None; 3];
-                let mut filled = 0;
-                // Angles without contact stay without teeth: the columns are zero there.
-                let _ = contact.for_each_pair(theta1_rad, direction, |touch| {
-                    if filled < entry.len() {
-                        entry[filled] = u16::try_from(touch.tooth.rem_euclid(teeth)).ok();
-                        filled += 1;
+        let Some(contact) = contact.as_ref().filter(|_| teeth > 0) else { return Vec::new() };
+        let half = if direction == Direction::Ccw { 0.0 } else { 0.5 };
+        let touches = |tooth: i64, theta1_rad: f64| {
+            let mut found = false;
+            // An angle without any contact has none of this tooth either.
+            let _ = contact.for_each_pair(theta1_rad, direction, |touch| {
+                found |= (touch.tooth - tooth).rem_euclid(teeth) == 0;
+            });
+            found
+        };
+        let pitch_mm = pair.pitch_mm().unwrap_or(f64::NAN);
+        let step_rad = TAU / ZONE_STEPS as f64;
+        (0..teeth)
+            .map(|tooth| {
+                let centre_rad = pair.theta1_at_arc_length((tooth as f64 + half) * pitch_mm);
+                let end = |way: f64| {
+                    let (mut inside, mut outside) = (0.0, 0.0);
+                    for n in 1..ZONE_STEPS / 2 {
+                        outside = way * n as f64 * step_rad;
+                        if !touches(tooth, centre_rad + outside) {
+                            break;
+                        }
+                        inside = outside;
                     }
-                });
-                entry
+                    for _ in 0..HALVINGS {
+                        let middle = 0.5 * (inside + outside);
+                        if touches(tooth, centre_rad + middle) { inside = middle } else { outside = middle }
+                    }
+                    pair.arc_length_mm(centre_rad + 0.5 * (inside + outside)) / pitch_mm - half - tooth as f64
+                };
+                Span { from: end(-1.0), to: end(1.0) }
             })
             .collect()
     })

@@ -21,6 +21,8 @@ pub struct Station {
     pub arm_mm: f64,
     /// Arc rolled since tooth 0 of the driving flank passed the pitch point, in pitches.
     pub pitches: f64,
+    /// Pitches a radian of the driver there.
+    pub pitches_per_rad: f64,
     /// Load on the driven shaft, N·m.
     pub load_nm: f64,
     /// Driver speed, signed, rad/s.
@@ -52,6 +54,16 @@ pub struct Ledger {
 }
 
 impl Station {
+    /// The same a little further along the driver's turn, as far as the teeth see it: angle and pitches.
+    #[must_use]
+    pub fn moved(&self, step_rad: f64) -> Self {
+        Self {
+            theta1_rad: self.theta1_rad + step_rad,
+            pitches: self.pitches + step_rad * self.pitches_per_rad,
+            ..*self
+        }
+    }
+
     /// The driving sense.
     #[must_use]
     pub fn direction(&self) -> Direction {

@@ -71,6 +71,8 @@ pub struct Pool {
     wave_values: Vec<[f64; WAVES]>,
 }
 
+/// Stations over a bin at which a trace that jumps is averaged.
+const SUB_STATIONS: usize = 6;
 /// Columns a matrix product.
 const PANEL: usize = 64;
 /// Traces smaller than this part of a block's largest direction are not seen under the plan.
@@ -161,6 +163,16 @@ impl Pool {
         let mut raw = vec![0.0; stations.len() * width];
         for (row, station) in raw.chunks_exact_mut(width).zip(stations) {
             match cause {
+                Cause::Effect { effect, shape, .. } if effect.sharp() => {
+                    let width_rad = std::f64::consts::TAU / grid.bins as f64;
+                    let mut part = vec![0.0; width];
+                    for n in 0..SUB_STATIONS {
+                        let step = (n as f64 + 0.5) / SUB_STATIONS as f64 - 0.5;
+                        part.fill(0.0);
+                        effect.row(rig, shape, &station.moved(step * width_rad), &mut part);
+                        row.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x / SUB_STATIONS as f64);
+                    }
+                }
                 Cause::Effect { effect, shape, .. } => effect.row(rig, shape, station, row),
                 Cause::Unknown(pattern) => pattern.row(station, row),
             }

@@ -132,7 +132,7 @@ impl Engine<'_> {
             let block = attribution.block[number].or_else(|| {
                 // Never part of a good model: the shape that fits best alone.
                 let empty = empty.as_ref()?;
-                let gains = super::super::evidence::scan(&self.pool, &self.whitened, &empty.fit, &own);
+                let gains = evidence::scan(&self.pool, &self.whitened, &empty.fit, &own);
                 own.iter().zip(gains).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(b, _)| *b)
             });
             let Some(block) = block else { continue };
