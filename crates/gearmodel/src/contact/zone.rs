@@ -45,6 +45,14 @@ impl Tips {
         self.pitch_mm
     }
 
+    /// Reach of a gear's flanks of one side to their tips, by tooth, mm of rolling.
+    pub(crate) fn reaches_mm(&self, gear: Gear, side: Direction) -> &[f64] {
+        match gear {
+            Gear::Driver => &self.driver_mm[side_index(side)],
+            Gear::Driven => &self.driven_mm[side_index(side)],
+        }
+    }
+
     /// Teeth that could be in contact.
     pub(super) fn candidates(&self, touch: &Touch) -> RangeInclusive<i64> {
         let (low_mm, high_mm) = (touch.arc_a_mm.min(touch.arc_b_mm), touch.arc_a_mm.max(touch.arc_b_mm));
