@@ -217,6 +217,17 @@ pub enum GeometryError {
         problem: &'static str,
     },
 
+    /// A parameter of another kind of pair.
+    #[error(
+        "a pair of kind \"{kind}\" has no {parameter}: eccentricity belongs to elliptical and lobed pairs, harmonic_scale to fourier and transmission, the sizes of teeth to all but constant"
+    )]
+    ForeignParameter {
+        /// The parameter.
+        parameter: &'static str,
+        /// The kind of pair.
+        kind: &'static str,
+    },
+
     /// A list of the wrong length.
     #[error("{quantity} has {given} values: {lower} to {upper} are needed")]
     Length {

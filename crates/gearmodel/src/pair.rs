@@ -164,8 +164,7 @@ impl GearPair {
     /// # Errors
     /// [`GeometryError`] for a number outside its range or a centre distance other than m (Z1 + Z2)/2.
     pub fn circular(spec: &CircularSpec) -> Result<Self, GeometryError> {
-        let data = spec.teeth_and_sizes();
-        data.check()?;
+        spec.check()?;
         let (z1, z2) = (f64::from(spec.teeth.0), f64::from(spec.teeth.1));
         let closing_mm = 0.5 * spec.module_mm * (z1 + z2);
         let circle = Circle::new(z1, z2);
@@ -175,7 +174,7 @@ impl GearPair {
                 (distance > radius).then(|| radius / (distance - radius))
             })?;
         }
-        data.pair(circle.into(), closing_mm)
+        spec.pair(circle.into(), closing_mm)
     }
 
     /// Any drive of constant ratio with two encoders: θ2 = θ1 / `ratio`, so that [`GearPair::ratio`] is 1/`ratio`.

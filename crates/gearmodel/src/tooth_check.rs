@@ -197,7 +197,8 @@ mod tests {
         for gear in [1, 2] {
             assert!(faults.iter().any(|fault| matches!(fault, GeometryError::Undercut { gear: g, .. } if *g == gear)));
             assert!(faults.iter().any(|fault| matches!(fault, GeometryError::Pointed { gear: g, .. } if *g == gear)));
-            let interference = |fault: &GeometryError| matches!(fault, GeometryError::Interference { gear: g, .. } if *g == gear);
+            let interference =
+                |fault: &GeometryError| matches!(fault, GeometryError::Interference { gear: g, .. } if *g == gear);
             assert!(faults.iter().any(interference), "{faults:?}");
         }
         assert!(GearPair::elliptical(&EllipticalSpec::default()).unwrap().tooth_faults().is_empty());

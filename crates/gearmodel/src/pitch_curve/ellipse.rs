@@ -26,11 +26,13 @@ pub struct Ellipse {
     arc_sines: Vec<f64>,
 }
 
-/// Derivatives of an elliptic pair by its eccentricity at fixed θ1, module and teeth.
+/// Derivatives of an elliptic or lobed pair by its eccentricity at fixed θ1, module and teeth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ByEccentricity {
-    /// ∂f/∂k, rad; ∂μ/∂k is −½ of it, because f = θ1 − 2μ.
+    /// ∂f/∂k, rad.
     pub(crate) theta2: f64,
+    /// ∂μ/∂k, rad.
+    pub(crate) mu: f64,
     /// ∂i21/∂k.
     pub(crate) ratio: f64,
     /// ∂ ln a/∂k: the perimeter stays π m Z.
@@ -75,6 +77,8 @@ impl Ellipse {
             / nodes as f64;
         ByEccentricity {
             theta2: 2.0 * sin / denominator,
+            // f = θ1 − 2μ
+            mu: -sin / denominator,
             ratio: (-2.0 * k * denominator + 2.0 * (1.0 - k * k) * (cos - k)) / (denominator * denominator),
             relative_distance: -slope / self.arc_mean,
         }

@@ -14,7 +14,7 @@ pub(crate) mod shape;
 
 pub use circle::Circle;
 pub use ellipse::Ellipse;
-pub(crate) use ellipse::MAX_ECCENTRICITY;
+pub(crate) use ellipse::{ByEccentricity, MAX_ECCENTRICITY};
 pub use lobed::Lobed;
 pub use numeric::Numeric;
 pub(crate) use numeric::{CELLS, highest, refine};
@@ -148,6 +148,17 @@ macro_rules! pitch_curves {
             }
         })+
     };
+}
+
+impl AnyCurve {
+    /// Derivatives by the eccentricity; `None` for curves without.
+    pub(crate) fn by_eccentricity(&self, theta1_rad: f64) -> Option<ByEccentricity> {
+        match self {
+            Self::Ellipse(curve) => Some(curve.by_eccentricity(theta1_rad)),
+            Self::Lobed(curve) => Some(curve.by_eccentricity(theta1_rad)),
+            Self::Circle(_) | Self::Numeric(_) => None,
+        }
+    }
 }
 
 pitch_curves! {

@@ -243,7 +243,7 @@ impl GearPair {
     /// Args:
     ///     theta1: driver angle, rad; a number or an array-like of any shape.
     ///     parameter: "e1_mm", "phi1_rad", "e2_mm", "phi2_rad", "backlash_mm", "centre_distance_error_mm",
-    ///         "pressure_angle_rad", "module_mm", "eccentricity", "shaft_compliance_output_rad_per_nm",
+    ///         "pressure_angle_rad", "module_mm", "eccentricity" (elliptic and lobed pairs), "shaft_compliance_output_rad_per_nm",
     ///         "shaft_compliance_input_rad_per_nm", "mesh_compliance_mm2_rad_per_nm", "load_nm" or "theta1_rad".
     ///     errors, direction, load_nm: as in :meth:`transmission_error`.
     ///
