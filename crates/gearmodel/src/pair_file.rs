@@ -276,7 +276,7 @@ impl RawFile {
             Ok((self.cosines.clone().unwrap_or_default(), self.sines.clone().unwrap_or_default()))
         };
         let curve = match kind {
-            "circular" => return Ok(PairSpec::Circular(teeth.into())),
+            "circular" => return Ok(PairSpec::Circular(teeth)),
             "lobed" => {
                 let [lobes1, lobes2] = need(kind, "lobes", self.lobes)?;
                 let eccentricity = need(kind, "eccentricity", self.eccentricity)?;
