@@ -74,6 +74,20 @@ fn exact_contact(pair: &GearPair) -> Result<(), GeometryError> {
             pairs as f64 / seconds / 1e6,
             angles as f64 / seconds / 1e6
         );
+        let theta1_rad: Vec<f64> = (0..4096).map(|step| TAU * f64::from(step) / 4096.0).collect();
+        let start = Instant::now();
+        for _ in 0..200 {
+            for direction in Direction::BOTH {
+                black_box(model.te_curve_rad(black_box(&theta1_rad), direction)).ok();
+            }
+        }
+        let seconds = start.elapsed().as_secs_f64() / 200.0;
+        println!(
+            "exact contact, {name}, as a curve of 4096 angles x 2 senses: {:.1} us, {:.2} M tooth pairs/s, {:.2} M angles/s",
+            seconds * 1e6,
+            pairs as f64 / angles as f64 * 8192.0 / seconds / 1e6,
+            8192.0 / seconds / 1e6
+        );
     }
     Ok(())
 }

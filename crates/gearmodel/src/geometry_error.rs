@@ -139,6 +139,23 @@ pub enum GeometryError {
         limit_mm: f64,
     },
 
+    /// The mate's tips want to touch where a gear has no flank any more.
+    #[error(
+        "the tips of gear {mate} run into the feet of gear {gear}'s teeth at theta1 = {theta1_rad:.6} rad: they would touch {reach_mm:.3} mm of rolling from the pitch point, where the flank ends at {limit_mm:.3} mm; take more teeth, a smaller addendum or a larger pressure angle"
+    )]
+    Interference {
+        /// Gear whose flank ends too early: 1 = driver, 2 = driven.
+        gear: u8,
+        /// The other gear.
+        mate: u8,
+        /// Rolling position of the contact, rad.
+        theta1_rad: f64,
+        /// Rolling from the pitch point to the contact with the mate's tip, mm.
+        reach_mm: f64,
+        /// Rolling from the pitch point to the end of the flank, mm.
+        limit_mm: f64,
+    },
+
     /// The tooth spaces reach the shaft.
     #[error(
         "the tooth spaces of gear {gear} reach its axis at theta1 = {theta1_rad:.6} rad: pitch radius {radius_mm:.3} mm, dedendum {dedendum_mm:.3} mm; take more teeth or a rounder curve"
@@ -198,6 +215,17 @@ pub enum GeometryError {
         index: usize,
         /// What is wrong, and what is needed.
         problem: &'static str,
+    },
+
+    /// A parameter of another kind of pair.
+    #[error(
+        "a pair of kind \"{kind}\" has no {parameter}: eccentricity belongs to elliptical and lobed pairs, harmonic_scale to fourier and transmission, the sizes of teeth to all but constant"
+    )]
+    ForeignParameter {
+        /// The parameter.
+        parameter: &'static str,
+        /// The kind of pair.
+        kind: &'static str,
     },
 
     /// A list of the wrong length.

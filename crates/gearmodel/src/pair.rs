@@ -1,7 +1,9 @@
 //! A gear pair: teeth, size and the kinematics of its pitch curves.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::{Arc, OnceLock};
 
+use crate::contact::Tips;
 use crate::geometry_error::{GeometryError, check_range, check_teeth};
 use crate::pitch_curve::{AnyCurve, Circle, Ellipse, PitchCurve};
 use crate::spec::{CircularSpec, EllipticalSpec, ToothSpec};
@@ -19,10 +21,23 @@ pub struct GearPair {
     module_mm: f64,
     teeth: (u32, u32),
     pressure_angle_rad: f64,
+    /// sin α and cos α.
+    pressure_angle_sin_cos: (f64, f64),
     face_width_mm: f64,
     addendum: f64,
     dedendum_clearance: f64,
     backlash_mm: f64,
+    tips: SharedTips,
+}
+
+/// The tips, found when first asked for and shared by clones. They follow from the rest, so all compare equal.
+#[derive(Clone, Debug, Default)]
+struct SharedTips(Arc<OnceLock<Arc<Tips>>>);
+
+impl PartialEq for SharedTips {
+    fn eq(&self, _other: &Self) -> bool {
+        true
+    }
 }
 
 /// Everything the increments need at one driver angle, evaluated once.
@@ -53,6 +68,15 @@ pub struct RollPoint {
     pub mu_slope: f64,
     /// Arc length s rolled since θ1 = 0, mm.
     pub arc_mm: f64,
+}
+
+impl RollPoint {
+    /// ds/dθ1 = r1/cos μ, mm/rad.
+    #[must_use]
+    #[inline]
+    pub fn arc_per_rad(&self) -> f64 {
+        self.at.r1_mm * (1.0 + self.tan_mu * self.tan_mu).sqrt()
+    }
 }
 
 impl ToothSpec {
@@ -94,10 +118,12 @@ impl ToothSpec {
             module_mm: self.module_mm,
             teeth: self.teeth,
             pressure_angle_rad: self.pressure_angle_deg.to_radians(),
+            pressure_angle_sin_cos: self.pressure_angle_deg.to_radians().sin_cos(),
             face_width_mm: self.face_width_mm,
             addendum: self.addendum,
             dedendum_clearance: self.dedendum_clearance,
             backlash_mm: self.backlash_mm,
+            tips: SharedTips::default(),
         })
     }
 }
@@ -138,8 +164,7 @@ impl GearPair {
     /// # Errors
     /// [`GeometryError`] for a number outside its range or a centre distance other than m (Z1 + Z2)/2.
     pub fn circular(spec: &CircularSpec) -> Result<Self, GeometryError> {
-        let data = spec.teeth_and_sizes();
-        data.check()?;
+        spec.check()?;
         let (z1, z2) = (f64::from(spec.teeth.0), f64::from(spec.teeth.1));
         let closing_mm = 0.5 * spec.module_mm * (z1 + z2);
         let circle = Circle::new(z1, z2);
@@ -149,7 +174,7 @@ impl GearPair {
                 (distance > radius).then(|| radius / (distance - radius))
             })?;
         }
-        data.pair(circle.into(), closing_mm)
+        spec.pair(circle.into(), closing_mm)
     }
 
     /// Any drive of constant ratio with two encoders: θ2 = θ1 / `ratio`, so that [`GearPair::ratio`] is 1/`ratio`.
@@ -173,10 +198,12 @@ impl GearPair {
             module_mm: 0.0,
             teeth: (0, 0),
             pressure_angle_rad: 0.0,
+            pressure_angle_sin_cos: (0.0, 1.0),
             face_width_mm: 0.0,
             addendum: 0.0,
             dedendum_clearance: 0.0,
             backlash_mm: 0.0,
+            tips: SharedTips::default(),
         })
     }
 
@@ -208,6 +235,12 @@ impl GearPair {
     #[must_use]
     pub fn pressure_angle_rad(&self) -> f64 {
         self.pressure_angle_rad
+    }
+
+    /// sin α and cos α, evaluated once.
+    #[inline]
+    pub(crate) fn pressure_angle_sin_cos(&self) -> (f64, f64) {
+        self.pressure_angle_sin_cos
     }
 
     /// Face width, mm.
@@ -310,6 +343,11 @@ impl GearPair {
         self.at(theta1_rad).mu_rad
     }
 
+    /// How far every flank reaches to its tip.
+    pub(crate) fn tips(&self) -> Arc<Tips> {
+        self.tips.0.get_or_init(|| Arc::new(Tips::of(self))).clone()
+    }
+
     /// Angles, radii and inclination at θ1, evaluated once.
     #[must_use]
     #[inline]
@@ -336,10 +374,8 @@ impl GearPair {
         let ratio = roll.motion.ratio;
         let r2_mm = self.centre_distance_mm / (1.0 + ratio);
         // g = tan μ = i'/(i (1 + i)); μ' = g'/(1 + g²)
-        let inverse = 1.0 / (ratio * (1.0 + ratio));
-        let slope = roll.motion.ratio_slope;
-        let tan_mu = slope * inverse;
-        let tan_mu_slope = roll.ratio_curvature * inverse - tan_mu * tan_mu * (1.0 + 2.0 * ratio);
+        let tan_mu = roll.tan_mu;
+        let tan_mu_slope = roll.ratio_curvature / (ratio * (1.0 + ratio)) - tan_mu * tan_mu * (1.0 + 2.0 * ratio);
         RollPoint {
             at: MeshPoint {
                 theta1_rad,
@@ -347,7 +383,7 @@ impl GearPair {
                 ratio,
                 r1_mm: r2_mm * ratio,
                 r2_mm,
-                mu_rad: tan_mu.atan(),
+                mu_rad: roll.mu_rad,
             },
             tan_mu,
             mu_slope: tan_mu_slope / (1.0 + tan_mu * tan_mu),

@@ -33,10 +33,16 @@ impl PairSpec {
     fn teeth(&self) -> (&'static str, Option<ToothSpec>) {
         match self {
             Self::Elliptical(spec) => ("elliptical", Some(spec.teeth_and_sizes())),
-            Self::Circular(spec) => ("circular", Some(spec.teeth_and_sizes())),
+            Self::Circular(teeth) => ("circular", Some(teeth.clone())),
             Self::Free { teeth, curve } => (curve.kind(), Some(teeth.clone())),
             Self::Constant { .. } => ("constant", None),
         }
+    }
+
+    /// Kind as in the file.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        self.teeth().0
     }
 
     /// The pair, checked.
@@ -270,7 +276,7 @@ impl RawFile {
             Ok((self.cosines.clone().unwrap_or_default(), self.sines.clone().unwrap_or_default()))
         };
         let curve = match kind {
-            "circular" => return Ok(PairSpec::Circular(teeth.into())),
+            "circular" => return Ok(PairSpec::Circular(teeth)),
             "lobed" => {
                 let [lobes1, lobes2] = need(kind, "lobes", self.lobes)?;
                 let eccentricity = need(kind, "eccentricity", self.eccentricity)?;

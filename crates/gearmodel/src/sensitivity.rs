@@ -9,7 +9,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::increment::common_normal;
-use crate::pitch_curve::{AnyCurve, PitchCurve};
+use crate::pitch_curve::PitchCurve;
 use crate::{Direction, NominalModel};
 
 /// A parameter of the nominal model.
@@ -32,8 +32,10 @@ pub enum Parameter {
     PressureAngleRad,
     /// Module m, mm, the teeth kept.
     ModuleMm,
-    /// Eccentricity k of an elliptic pair, module and teeth kept: both gears are designed anew and f with them.
+    /// Eccentricity k of an elliptic or lobed pair, module and teeth kept: both gears are designed anew and f with them.
     Eccentricity,
+    /// Factor on all amplitudes of a Fourier or transmission curve, 1 as given: both gears are designed anew.
+    HarmonicScale,
     /// C_out, rad/(N·m).
     ShaftComplianceOutputRadPerNm,
     /// C_in, rad/(N·m).
@@ -48,7 +50,7 @@ pub enum Parameter {
 
 impl Parameter {
     /// All parameters, in the order of the model's description.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::E1Mm,
         Self::Phi1Rad,
         Self::E2Mm,
@@ -58,6 +60,7 @@ impl Parameter {
         Self::PressureAngleRad,
         Self::ModuleMm,
         Self::Eccentricity,
+        Self::HarmonicScale,
         Self::ShaftComplianceOutputRadPerNm,
         Self::ShaftComplianceInputRadPerNm,
         Self::MeshComplianceMm2RadPerNm,
@@ -78,6 +81,7 @@ impl Parameter {
             Self::PressureAngleRad => "pressure_angle_rad",
             Self::ModuleMm => "module_mm",
             Self::Eccentricity => "eccentricity",
+            Self::HarmonicScale => "harmonic_scale",
             Self::ShaftComplianceOutputRadPerNm => "shaft_compliance_output_rad_per_nm",
             Self::ShaftComplianceInputRadPerNm => "shaft_compliance_input_rad_per_nm",
             Self::MeshComplianceMm2RadPerNm => "mesh_compliance_mm2_rad_per_nm",
@@ -106,7 +110,8 @@ struct Change {
 
 impl NominalModel {
     /// ∂TE/∂parameter at θ1 under `load_nm`, rad per unit of the parameter. `None` where the pair does not have the parameter:
-    /// the eccentricity of a pair that is not elliptic, the module of a drive without teeth.
+    /// the eccentricity of a pair that is neither elliptic nor lobed, the module of a drive without teeth. None of them has a
+    /// derivative by the scale of harmonics, whose amplitudes a made pair does not keep: sweep it.
     #[must_use]
     pub fn te_derivative(
         &self,
@@ -160,13 +165,13 @@ impl NominalModel {
                     alpha: 0.0,
                 }
             }
+            Parameter::HarmonicScale => return None,
             Parameter::Eccentricity => {
-                let AnyCurve::Ellipse(ellipse) = pair.pitch_curve() else { return None };
-                let by_k = ellipse.by_eccentricity(theta1_rad);
+                let by_k = pair.pitch_curve().by_eccentricity(theta1_rad)?;
                 let a = pair.centre_distance_mm();
                 Change {
                     theta2: by_k.theta2,
-                    mu: -0.5 * by_k.theta2,
+                    mu: by_k.mu,
                     ratio: by_k.ratio,
                     // r2 = a/(1 + i)
                     r2: at.r2_mm * by_k.relative_distance - a * by_k.ratio / (1.0 + at.ratio).powi(2),
@@ -195,11 +200,22 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::{EllipticalSpec, Errors, GearPair};
+    use crate::{CurveSpec, Errors, GearPair, ToothSpec};
+
+    /// Teeth, eccentricity, and the lobes of a lobed pair.
+    type Spec = (ToothSpec, f64, Option<(u32, u32)>);
+
+    fn pair((teeth, eccentricity, lobes): &Spec) -> GearPair {
+        let eccentricity = *eccentricity;
+        match *lobes {
+            None => GearPair::elliptical(&teeth.with_eccentricity(eccentricity)).unwrap(),
+            Some(lobes) => GearPair::free(teeth, &CurveSpec::Lobed { eccentricity, lobes }).unwrap(),
+        }
+    }
 
     /// The model with one parameter moved, and the θ1, Δa and load at which to evaluate it.
-    fn te_with(base: &(EllipticalSpec, Errors, f64, f64), parameter: Parameter, by: f64, direction: Direction) -> f64 {
-        let (mut spec, mut errors, mut theta1, mut load) = base.clone();
+    fn te_with(base: &(Spec, Errors, f64, f64), parameter: Parameter, by: f64, direction: Direction) -> f64 {
+        let ((mut spec, mut k, lobes), mut errors, mut theta1, mut load) = base.clone();
         let mut da = 0.0;
         match parameter {
             Parameter::E1Mm => errors.e1_mm += by,
@@ -210,14 +226,15 @@ mod tests {
             Parameter::CentreDistanceErrorMm => da = by,
             Parameter::PressureAngleRad => spec.pressure_angle_deg += by.to_degrees(),
             Parameter::ModuleMm => spec.module_mm += by,
-            Parameter::Eccentricity => spec.eccentricity += by,
+            Parameter::Eccentricity => k += by,
+            Parameter::HarmonicScale => {}
             Parameter::ShaftComplianceOutputRadPerNm => errors.shaft_compliance_output_rad_per_nm += by,
             Parameter::ShaftComplianceInputRadPerNm => errors.shaft_compliance_input_rad_per_nm += by,
             Parameter::MeshComplianceMm2RadPerNm => errors.mesh_compliance_mm2_rad_per_nm += by,
             Parameter::LoadNm => load += by,
             Parameter::Theta1Rad => theta1 += by,
         }
-        let model = NominalModel::new(GearPair::elliptical(&spec).unwrap(), errors).unwrap();
+        let model = NominalModel::new(pair(&(spec, k, lobes)), errors).unwrap();
         let at = model.pair.at(theta1);
         model.te_rad(theta1, direction, load)
             + common_normal::displacement_te_rad(&model.pair, &at, (-da, 0.0), direction)
@@ -227,17 +244,20 @@ mod tests {
         #[test]
         fn derivatives_agree_with_central_differences(
             k in 0.05..0.7_f64, e1 in 0.01..0.1_f64, phi1 in -3.0..3.0_f64, e2 in 0.01..0.1_f64, phi2 in -3.0..3.0_f64,
-            backlash in 0.02..0.2_f64, theta in -7.0..7.0_f64, load in 1.0..20.0_f64, cw in any::<bool>(),
+            backlash in 0.02..0.2_f64, theta in -7.0..7.0_f64, load in 1.0..20.0_f64, cw in any::<bool>(), kind in 0..4_usize,
         ) {
-            let spec = EllipticalSpec { eccentricity: k, backlash_mm: backlash, ..Default::default() };
+            let (lobes, teeth) = [(None, (47, 47)), (Some((1, 2)), (40, 80)), (Some((2, 3)), (48, 72)), (Some((3, 3)), (60, 60))][kind];
+            let spec = ToothSpec { teeth, backlash_mm: backlash, ..Default::default() };
+            // Higher orders get steep: k n/√(1 − k²) is tan μ.
+            let k = if lobes.is_some_and(|lobes| lobes.0 > 1) { 0.4 * k } else { k };
             let errors = Errors {
                 e1_mm: e1, phi1_rad: phi1, e2_mm: e2, phi2_rad: phi2, shaft_compliance_output_rad_per_nm: 2e-5,
                 shaft_compliance_input_rad_per_nm: 1e-5, mesh_compliance_mm2_rad_per_nm: 5e-3,
             };
             let direction = if cw { Direction::Cw } else { Direction::Ccw };
-            let base = (spec, errors, theta, load);
-            let model = NominalModel::new(GearPair::elliptical(&base.0).unwrap(), errors).unwrap();
-            for parameter in Parameter::ALL {
+            let base = ((spec, k, lobes), errors, theta, load);
+            let model = NominalModel::new(pair(&base.0), errors).unwrap();
+            for parameter in Parameter::ALL.into_iter().filter(|parameter| *parameter != Parameter::HarmonicScale) {
                 let scale = match parameter {
                     Parameter::ShaftComplianceOutputRadPerNm | Parameter::ShaftComplianceInputRadPerNm => 1e-5,
                     Parameter::MeshComplianceMm2RadPerNm => 1e-3,
@@ -267,6 +287,7 @@ mod tests {
         }
         let model = NominalModel::new(GearPair::constant(3.0).unwrap(), Errors::default()).unwrap();
         assert_eq!(model.te_derivative(Parameter::Eccentricity, 0.0, Direction::Ccw, 1.0), None);
+        assert_eq!(model.te_derivative(Parameter::HarmonicScale, 0.0, Direction::Ccw, 1.0), None);
         assert_eq!(model.te_derivative(Parameter::ModuleMm, 0.0, Direction::Ccw, 1.0), None);
         assert_eq!(model.te_derivative(Parameter::LoadNm, 0.0, Direction::Ccw, 1.0), Some(-0.0));
     }

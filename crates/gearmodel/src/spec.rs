@@ -44,42 +44,8 @@ impl Default for EllipticalSpec {
     }
 }
 
-/// A pair of circular gears.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CircularSpec {
-    /// Module m, mm.
-    pub module_mm: f64,
-    /// Teeth of the driver and of the driven gear.
-    pub teeth: (u32, u32),
-    /// Pressure angle α of the rack, deg.
-    pub pressure_angle_deg: f64,
-    /// Centre distance of the drawing, mm; checked against m (Z1 + Z2)/2, `None` = that one.
-    pub centre_distance_mm: Option<f64>,
-    /// Designed backlash of both gears together along the pitch curve, mm.
-    pub backlash_mm: f64,
-    /// Face width, mm.
-    pub face_width_mm: f64,
-    /// Addendum in modules.
-    pub addendum: f64,
-    /// Clearance of the dedendum over the mate's addendum, in modules.
-    pub dedendum_clearance: f64,
-}
-
-impl Default for CircularSpec {
-    /// m = 3 mm, 47 teeth on both gears, α = 20°, no backlash.
-    fn default() -> Self {
-        Self {
-            module_mm: 3.0,
-            teeth: (47, 47),
-            pressure_angle_deg: 20.0,
-            centre_distance_mm: None,
-            backlash_mm: 0.0,
-            face_width_mm: 30.0,
-            addendum: 1.0,
-            dedendum_clearance: 0.25,
-        }
-    }
-}
+/// A pair of circular gears: teeth and sizes say everything.
+pub type CircularSpec = ToothSpec;
 
 /// Teeth and sizes of a pair, whatever its pitch curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -159,38 +125,6 @@ impl ToothSpec {
             module_mm: self.module_mm,
             teeth: self.teeth,
             eccentricity,
-            pressure_angle_deg: self.pressure_angle_deg,
-            centre_distance_mm: self.centre_distance_mm,
-            backlash_mm: self.backlash_mm,
-            face_width_mm: self.face_width_mm,
-            addendum: self.addendum,
-            dedendum_clearance: self.dedendum_clearance,
-        }
-    }
-}
-
-impl From<ToothSpec> for CircularSpec {
-    fn from(teeth: ToothSpec) -> Self {
-        Self {
-            module_mm: teeth.module_mm,
-            teeth: teeth.teeth,
-            pressure_angle_deg: teeth.pressure_angle_deg,
-            centre_distance_mm: teeth.centre_distance_mm,
-            backlash_mm: teeth.backlash_mm,
-            face_width_mm: teeth.face_width_mm,
-            addendum: teeth.addendum,
-            dedendum_clearance: teeth.dedendum_clearance,
-        }
-    }
-}
-
-impl CircularSpec {
-    /// Teeth and sizes, whatever the pitch curve.
-    #[must_use]
-    pub fn teeth_and_sizes(&self) -> ToothSpec {
-        ToothSpec {
-            module_mm: self.module_mm,
-            teeth: self.teeth,
             pressure_angle_deg: self.pressure_angle_deg,
             centre_distance_mm: self.centre_distance_mm,
             backlash_mm: self.backlash_mm,

@@ -175,7 +175,11 @@ impl Drawn {
             Parameter::MeshComplianceMm2RadPerNm => self.errors.mesh_compliance_mm2_rad_per_nm += by,
             Parameter::LoadNm => self.load_factor += if load_nm == 0.0 { 0.0 } else { by / load_nm },
             // Refused before any draw.
-            Parameter::PressureAngleRad | Parameter::ModuleMm | Parameter::Eccentricity | Parameter::Theta1Rad => {}
+            Parameter::PressureAngleRad
+            | Parameter::ModuleMm
+            | Parameter::Eccentricity
+            | Parameter::HarmonicScale
+            | Parameter::Theta1Rad => {}
         }
     }
 
@@ -199,8 +203,13 @@ impl Drawn {
 impl ToleranceStudy {
     fn check(&self) -> Result<(), ToleranceError> {
         for (n, (parameter, scatter)) in self.scatter.iter().enumerate() {
-            let design =
-                [Parameter::PressureAngleRad, Parameter::ModuleMm, Parameter::Eccentricity, Parameter::Theta1Rad];
+            let design = [
+                Parameter::PressureAngleRad,
+                Parameter::ModuleMm,
+                Parameter::Eccentricity,
+                Parameter::HarmonicScale,
+                Parameter::Theta1Rad,
+            ];
             if design.contains(parameter) {
                 return Err(ToleranceError::Design { parameter: parameter.name() });
             }

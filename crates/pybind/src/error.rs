@@ -257,12 +257,6 @@ pub enum InputError {
         /// The text given.
         given: String,
     },
-    /// A pair that has no eccentricity to vary.
-    #[error("a pair of kind {kind:?} cannot be swept: take an elliptic one, or two equal circular gears")]
-    SweptKind {
-        /// The kind of pair.
-        kind: &'static str,
-    },
     /// A parameter of another kind of pair.
     #[error("parameter {given:?} does not belong to a pair of kind {kind:?}")]
     ForeignParameter {

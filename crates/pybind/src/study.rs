@@ -2,10 +2,10 @@
 
 use std::sync::Mutex;
 
+use gearmodel::Direction;
 use gearmodel::sensitivity::Parameter;
 use gearmodel::sweep::{Sweep, SweepFigure, SweepMethod};
 use gearmodel::tolerance::{Scatter, ToleranceStudy};
-use gearmodel::{Direction, EllipticalSpec, GearPair as ModelPair, PairSpec};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping};
@@ -65,22 +65,14 @@ impl Progress {
     }
 }
 
-/// The elliptic pair from which a sweep starts; two equal circular gears are one without eccentricity.
-fn elliptical(pair: &GearPair) -> Result<EllipticalSpec> {
-    match &pair.file.gears {
-        PairSpec::Elliptical(spec) => Ok(spec.clone()),
-        PairSpec::Circular(spec) if spec.teeth.0 == spec.teeth.1 => Ok(spec.teeth_and_sizes().with_eccentricity(0.0)),
-        _ => Err(InputError::SweptKind { kind: ModelPair::kind(&pair.model.pair) }.into()),
-    }
-}
-
 /// A figure of TE or backlash over a grid of parameters, labelled; on all cores.
 ///
 /// Args:
-///     pair: an elliptic pair, or two equal circular gears, at the grid's origin.
+///     pair: at the grid's origin, of any kind. Where a size of its gears is swept its centre distance follows closure.
 ///     over: name of a parameter to its values, in the unit of the name: "eccentricity", "e1_mm", "phi1_rad", "e2_mm",
 ///         "phi2_rad", "backlash_mm", "centre_distance_error_mm", "pressure_angle_rad" (or _deg), "module_mm", "load_nm",
-///         "theta1_rad" or a compliance of :class:`Errors`.
+///         "theta1_rad" or a compliance of :class:`Errors`. "eccentricity" belongs to elliptic and lobed pairs and to two
+///         equal circular gears; "harmonic_scale", a factor on all amplitudes, to Fourier and transmission curves.
 ///     of: "te_pp", "te_rms" (about its mean), "te_mean", "backlash_pp" or "backlash_mean", all rad.
 ///     errors: at the grid's origin; None: the pair's own.
 ///     direction: "ccw" or "cw", for the figures of TE.
@@ -93,8 +85,8 @@ fn elliptical(pair: &GearPair) -> Result<EllipticalSpec> {
 ///     SweepTable: ``values`` with an axis a parameter, ``axes``, ``faults``; a cell whose pair cannot be made is NaN.
 ///
 /// Raises:
-///     ValueError: an unknown name, or a pair of another kind.
-///     GeometryError: an empty axis, or too many cells.
+///     ValueError: an unknown name.
+///     GeometryError: a parameter of another kind of pair, an empty axis, or too many cells.
 ///
 /// >>> import gearmodel as gm
 /// >>> pair = gm.GearPair.elliptical(module_mm=3, teeth=47, eccentricity=0.3)
@@ -141,7 +133,7 @@ pub fn sweep<'py>(
         axes.set_item(name, PyArray1::from_vec(py, values))?;
     }
     let sweep = Sweep {
-        gears: elliptical(pair.get())?,
+        gears: pair.get().file.gears.clone(),
         errors: errors.map_or(pair.get().model.errors, |errors| errors.get().0),
         load_nm,
         over: grid,

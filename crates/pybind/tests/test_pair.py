@@ -43,8 +43,11 @@ def test_long_arrays_over_all_cores_equal_short_ones(pair, errors):
     theta = np.linspace(0, 50, 100_003)
     for method in ("common_normal", "exact"):
         whole = pair.transmission_error(theta, errors, method=method)
-        np.testing.assert_array_equal(whole[:1000], pair.transmission_error(theta[:1000], errors, method=method))
-        np.testing.assert_array_equal(whole[-1000:], pair.transmission_error(theta[-1000:], errors, method=method))
+        # Exact contact is carried between nodes that depend on which angles are asked for.
+        apart = 1e-12 if method == "exact" else 0.0
+        for part in (slice(None, 1000), slice(-1000, None)):
+            alone = pair.transmission_error(theta[part], errors, method=method)
+            np.testing.assert_allclose(whole[part], alone, rtol=0, atol=apart)
 
 
 def test_a_gap_stays_a_gap(pair, errors):

@@ -39,10 +39,40 @@ def test_what_a_sweep_refuses(pair):
         ({"over": {"e1_mm": []}}, "axis"),
         ({"of": "noise"}, "noise"),
         ({"method": "published"}, "published"),
-        ({"pair": gm.GearPair.constant(ratio=3)}, "constant"),
+        ({"pair": gm.GearPair.constant(ratio=3), "over": {"module_mm": [1.0]}}, "constant"),
+        ({"pair": gm.GearPair.fourier(module_mm=3, teeth=40, cosines=[0.1]), "over": {"eccentricity": [0.1]}}, "fourier"),
     ):
         with pytest.raises(ValueError, match=text):
             gm.sweep(**({"pair": pair, "over": {"e1_mm": [0.1]}} | change))
+
+
+@pytest.mark.parametrize("method", ["common_normal", "exact"])
+def test_every_kind_of_pair_sweeps_what_it_has(errors, method):
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+
+    def fourier(scale):
+        return gm.GearPair.fourier(module_mm=3, teeth=40, cosines=[0.1 * scale, 0.02 * scale])
+
+    def lobed(k):
+        return gm.GearPair.lobed(module_mm=3, teeth=(40, 60), eccentricity=k, lobes=(2, 3))
+
+    def sampled(module):
+        return gm.GearPair.sampled(module_mm=module, teeth=40, theta1_rad=angle, radius=1 + 0.1 * np.cos(angle))
+
+    def circular(module):
+        return gm.GearPair.circular(module_mm=module, teeth=(40, 60))
+
+    for make, name, values, at in (
+        (fourier, "harmonic_scale", [0.5, 0.9], 1.0),
+        (lobed, "eccentricity", [0.02, 0.08], 0.05),
+        (sampled, "module_mm", [2.0, 3.0], 3.0),
+        (circular, "module_mm", [2.0, 3.0], 3.0),
+    ):
+        table = gm.sweep(make(at), over={name: values, "e2_mm": [0.01, 0.03]}, errors=errors, method=method, angles=90)
+        theta = 2 * np.pi * np.arange(90) / 90
+        for row, value in zip(table.values, values):
+            alone = make(value).transmission_error(theta, errors.replace(e2_mm=0.03), method=method)
+            assert abs(row[1] - np.ptp(alone)) < 1e-12
 
 
 def test_progress_and_its_exceptions(pair):

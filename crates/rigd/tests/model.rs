@@ -174,6 +174,8 @@ fn sweeps_are_labelled_and_say_where_there_is_no_pair() {
     refused(&["sweep", "--over", "colour=1"], &["colour", "e1_mm"]);
     refused(&["sweep", "--over", "e1_mm=3..1:1"], &["FIRST <= LAST"]);
     refused(&["sweep"], &["--over"]);
+    // A parameter of another kind of pair is refused before anything is computed.
+    refused(&["sweep", "--over", "harmonic_scale=0.5,1"], &["harmonic_scale", "elliptical"]);
 }
 
 #[test]

@@ -24,14 +24,18 @@
 //! Where the lead ε changes along the flank, the flanks touch not at the nominal point but where ε reaches furthest over the
 //! opening gap: ε is replaced by max over u' of ε(u') − q (u' − u)², q the relative curvature of the two flanks.
 
+mod curve;
+mod series;
 mod solve;
 mod tooth_errors;
 mod zone;
 
 pub use tooth_errors::{Profile, ToothDamage, ToothErrors};
 
+use std::sync::Arc;
+
 use solve::{Displacement, Touch};
-use zone::Tips;
+pub(crate) use zone::Tips;
 
 use crate::geometry_error::check_range;
 use crate::increment::common_normal;
@@ -116,7 +120,7 @@ pub struct ContactModel {
     pair: GearPair,
     displacement: Displacement,
     teeth: ToothErrors,
-    tips: Tips,
+    tips: Arc<Tips>,
 }
 
 impl ContactModel {
@@ -126,7 +130,7 @@ impl ContactModel {
     /// [`GeometryError`] when an error is out of range.
     pub fn new(pair: GearPair, errors: &Errors) -> Result<Self, GeometryError> {
         errors.check()?;
-        let tips = Tips::of(&pair);
+        let tips = pair.tips();
         Ok(Self { displacement: Displacement::new(errors), teeth: ToothErrors::default(), tips, pair })
     }
 

@@ -54,6 +54,8 @@ pub(super) struct Touch {
     theta_rad: (f64, f64),
     /// How the rolling positions move with the lead of gear 1's flank, rad/mm.
     theta_per_lead: (f64, f64),
+    /// How ψ2 moves with the lead, rad/mm.
+    pub(super) psi2_per_lead: f64,
     /// What the curvature of both flanks needs beside the tooth's own offset.
     bend: Bend,
 }
@@ -69,6 +71,21 @@ struct Bend {
 }
 
 impl Touch {
+    /// Rolling positions of the contact point on gear 1 and gear 2, rad.
+    pub(super) fn theta_rad(&self) -> (f64, f64) {
+        self.theta_rad
+    }
+
+    /// Arc length on the gear whose tip ends the contact on the side of smaller θ1, mm.
+    pub(super) fn begins_mm(&self) -> f64 {
+        if self.direction == Direction::Ccw { self.arc_b_mm } else { self.arc_a_mm }
+    }
+
+    /// Arc length on the gear whose tip ends the contact on the side of larger θ1, mm.
+    pub(super) fn ends_mm(&self) -> f64 {
+        if self.direction == Direction::Ccw { self.arc_a_mm } else { self.arc_b_mm }
+    }
+
     /// Rolling positions of the contact when gear 1's flank leads by `lead_mm`, rad, to first order.
     pub(super) fn theta_with_lead_rad(&self, lead_mm: f64) -> (f64, f64) {
         (self.theta_rad.0 + self.theta_per_lead.0 * lead_mm, self.theta_rad.1 + self.theta_per_lead.1 * lead_mm)
@@ -142,7 +159,7 @@ fn driven_support(roll: &RollPoint, alpha: (f64, f64), offset_rad: f64, sign: f6
 /// Newton steps allowed; three reach rounding for displacements of a tenth of a millimetre.
 const MAX_STEPS: u32 = 40;
 /// A step this short is the last, and is taken along the tangents: what they miss is of its square, below 1e-12 rad.
-const LAST_STEP_RAD: f64 = 5e-7;
+const LAST_STEP_RAD: f64 = 5e-8;
 
 /// Finds the contact of the flanks of one side at the driver angle `psi1_rad`, gear 1's flank carrying `lead_mm` along the
 /// normal (positive: driven gear ahead), from the rolling positions `start_rad` where they are known already.
@@ -155,9 +172,8 @@ pub(super) fn touch(
     start_rad: Option<(f64, f64)>,
 ) -> Result<Touch, ContactError> {
     let sign = direction.sign();
-    let alpha_rad = pair.pressure_angle_rad();
-    let alpha = alpha_rad.sin_cos();
-    let offset_rad = sign * (FRAC_PI_2 - alpha_rad);
+    let alpha = pair.pressure_angle_sin_cos();
+    let offset_rad = sign * (FRAC_PI_2 - pair.pressure_angle_rad());
     // Material along gear 1's normal. Both gears together are thinned by j along the pitch curve: each flank gives way by
     // j/2 · cos α. A lead in the sense of +θ2 is material on the ccw flank and missing material on the cw flank.
     let material_mm = sign * lead_mm - 0.5 * pair.backlash_mm() * alpha.1;
@@ -166,6 +182,7 @@ pub(super) fn touch(
     let mut roll_a = pair.roll(theta_a);
     // From the nominal position both gears roll at one angle, and the first evaluation serves both.
     let mut roll_b = if start_rad.is_some() { pair.roll(theta_b) } else { roll_a };
+    let (sin_u, cos_u) = (psi1_rad + displacement.phi1_rad).sin_cos();
     let mut residual_mm = f64::INFINITY;
     for _ in 0..MAX_STEPS {
         let a = driver_support(&roll_a, alpha, offset_rad, sign);
@@ -173,7 +190,6 @@ pub(super) fn touch(
         let chi_rad = a.chi_rad + psi1_rad;
         let psi2_rad = b.chi_rad - chi_rad;
         let (sin_chi, cos_chi) = chi_rad.sin_cos();
-        let (sin_u, cos_u) = (psi1_rad + displacement.phi1_rad).sin_cos();
         let (sin_v, cos_v) = (psi2_rad + displacement.phi2_rad).sin_cos();
         // W = E1 + δ − O2 − E2, E2 = e2 (cos v, −sin v); W' = dW/dψ2
         let w = [
@@ -205,14 +221,16 @@ pub(super) fn touch(
         }
         if step_a.abs().max(step_b.abs()) <= LAST_STEP_RAD {
             let (theta_a, theta_b) = (theta_a + step_a, theta_b + step_b);
-            let arc_per_rad = roll_a.at.r1_mm / roll_a.at.mu_rad.cos();
+            let (arc_per_rad, arc_b_per_rad) = (roll_a.arc_per_rad(), roll_b.arc_per_rad());
+            let theta_per_lead = (-sign * slip_b / determinant, sign * slip_a / determinant);
             return Ok(Touch {
                 psi2_rad: psi2_rad + b.chi_slope * step_b - a.chi_slope * step_a,
                 arc_a_mm: roll_a.arc_mm + arc_per_rad * step_a,
-                arc_b_mm: roll_b.arc_mm + roll_b.at.r1_mm / roll_b.at.mu_rad.cos() * step_b,
+                arc_b_mm: roll_b.arc_mm + arc_b_per_rad * step_b,
                 direction,
                 theta_rad: (theta_a, theta_b),
-                theta_per_lead: (-sign * slip_b / determinant, sign * slip_a / determinant),
+                theta_per_lead,
+                psi2_per_lead: b.chi_slope * theta_per_lead.1 - a.chi_slope * theta_per_lead.0,
                 bend: Bend {
                     h_mm: (a.h_mm, b.h_mm),
                     chi_slope: (a.chi_slope, b.chi_slope),

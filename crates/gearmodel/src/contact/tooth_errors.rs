@@ -93,6 +93,24 @@ impl ToothErrors {
         of(&self.driver_pitch_mm[side]) + of(&self.driven_pitch_mm[side])
     }
 
+    /// Smallest and largest lead that any two teeth's pitch errors can make, mm.
+    pub(super) fn pitch_lead_range_mm(&self, direction: Direction) -> (f64, f64) {
+        let side = side_index(direction);
+        let tables = [&self.driver_pitch_mm[side], &self.driven_pitch_mm[side]];
+        tables.into_iter().filter(|table| !table.is_empty()).fold((0.0, 0.0), |(low, high), table| {
+            let (least, most) = table
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), lead| (lead.min(least), lead.max(most)));
+            (low + least, high + most)
+        })
+    }
+
+    /// Whether the lead of any tooth pair changes along the flank.
+    pub(super) fn any_shape(&self, direction: Direction) -> bool {
+        self.profile[side_index(direction)] != Profile::default()
+            || self.damage.iter().any(|damage| damage.flank == direction)
+    }
+
     /// Whether a tooth pair's lead changes along the flank.
     pub(super) fn has_shape(&self, tooth: i64, teeth: u32, direction: Direction) -> bool {
         self.profile[side_index(direction)] != Profile::default()

@@ -1,5 +1,7 @@
 //! Which tooth pairs can touch: the tips of both gears.
 
+use std::ops::RangeInclusive;
+
 use super::solve::Touch;
 use super::tooth_errors::side_index;
 use crate::flank::Gear;
@@ -10,7 +12,7 @@ use crate::{Direction, GearPair};
 /// Tips lie on the curve that stands off the pitch curve by the addendum: a true distance, measured at the foot of the
 /// tip, not at the rolling position that generates it.
 #[derive(Clone, Debug)]
-pub(super) struct Tips {
+pub(crate) struct Tips {
     pitch_mm: f64,
     /// How far thinning moves each gear's flank along the rack, mm.
     thinning_mm: f64,
@@ -24,7 +26,7 @@ pub(super) struct Tips {
 
 impl Tips {
     /// Tips of a pair; empty without teeth.
-    pub(super) fn of(pair: &GearPair) -> Self {
+    pub(crate) fn of(pair: &GearPair) -> Self {
         let pitch_mm = pair.pitch_mm().unwrap_or(f64::NAN);
         let thinning_mm = 0.25 * pair.backlash_mm();
         let (z1, z2) = pair.teeth();
@@ -43,12 +45,26 @@ impl Tips {
         self.pitch_mm
     }
 
+    /// Reach of a gear's flanks of one side to their tips, by tooth, mm of rolling.
+    pub(crate) fn reaches_mm(&self, gear: Gear, side: Direction) -> &[f64] {
+        match gear {
+            Gear::Driver => &self.driver_mm[side_index(side)],
+            Gear::Driven => &self.driven_mm[side_index(side)],
+        }
+    }
+
     /// Teeth that could be in contact.
-    pub(super) fn candidates(&self, touch: &Touch) -> std::ops::RangeInclusive<i64> {
-        let half = if touch.direction == Direction::Ccw { 0.0 } else { 0.5 };
-        let low = touch.arc_a_mm.min(touch.arc_b_mm) - self.longest_mm;
-        let high = touch.arc_a_mm.max(touch.arc_b_mm) + self.longest_mm;
-        ((low / self.pitch_mm - half).ceil() as i64)..=((high / self.pitch_mm - half).floor() as i64)
+    pub(super) fn candidates(&self, touch: &Touch) -> RangeInclusive<i64> {
+        let (low_mm, high_mm) = (touch.arc_a_mm.min(touch.arc_b_mm), touch.arc_a_mm.max(touch.arc_b_mm));
+        self.candidates_between((low_mm, high_mm), touch.direction)
+    }
+
+    /// Teeth that could be in contact while the contact's arc lengths stay within `arcs_mm`.
+    pub(super) fn candidates_between(&self, arcs_mm: (f64, f64), direction: Direction) -> RangeInclusive<i64> {
+        let half = if direction == Direction::Ccw { 0.0 } else { 0.5 };
+        let reach_mm = self.longest_mm + self.thinning_mm;
+        let (low, high) = ((arcs_mm.0 - reach_mm) / self.pitch_mm, (arcs_mm.1 + reach_mm) / self.pitch_mm);
+        ((low - half).ceil() as i64)..=((high - half).floor() as i64)
     }
 
     /// Pitches of rolling for which a tooth's flank can be in contact.
@@ -60,19 +76,31 @@ impl Tips {
         (reach(&self.driver_mm[side]) + reach(&self.driven_mm[side])) / self.pitch_mm
     }
 
+    /// Where a tooth pair's contact begins and ends as θ1 grows, mm of arc length: it has begun once the contact on one
+    /// gear's flank ([`Touch::begins_mm`]) is past the first value, and ends when that on the other gear's
+    /// ([`Touch::ends_mm`]) passes the second. NaN without teeth.
+    pub(super) fn passage_mm(&self, tooth: i64, direction: Direction) -> (f64, f64) {
+        let side = side_index(direction);
+        let half = if direction == Direction::Ccw { 0.0 } else { 0.5 };
+        let origin_mm = (tooth as f64 + half) * self.pitch_mm;
+        let reach = |table: &[f64]| {
+            table.get(tooth.rem_euclid(table.len().max(1) as i64) as usize).copied().unwrap_or(f64::NAN)
+        };
+        let (driver_mm, driven_mm) = (reach(&self.driver_mm[side]), reach(&self.driven_mm[side]));
+        // Towards the tip of gear 1 the rack's offset grows on the ccw flank and falls on the cw flank.
+        let (before_mm, after_mm) = match direction {
+            Direction::Ccw => (driven_mm, driver_mm),
+            Direction::Cw => (driver_mm, driven_mm),
+        };
+        (origin_mm - self.thinning_mm - before_mm, origin_mm + self.thinning_mm + after_mm)
+    }
+
     /// Position of a tooth's contact in pitches of rolling from its pitch point, when it is within both tips.
     pub(super) fn phase_in_zone(&self, touch: &Touch, tooth: i64) -> Option<f64> {
-        let side = side_index(touch.direction);
         let half = if touch.direction == Direction::Ccw { 0.0 } else { 0.5 };
-        let origin_mm = (tooth as f64 + half) * self.pitch_mm;
-        // Towards the tip of gear 1 the rack's offset grows on the ccw flank and falls on the cw flank.
-        let sign = touch.direction.sign();
-        let on_driver_mm = touch.arc_a_mm - origin_mm - sign * self.thinning_mm;
-        let on_driven_mm = touch.arc_b_mm - origin_mm + sign * self.thinning_mm;
-        let reach = |table: &[f64]| table.get(tooth.rem_euclid(table.len().max(1) as i64) as usize).copied();
-        let within = sign * on_driver_mm <= reach(&self.driver_mm[side])?
-            && -sign * on_driven_mm <= reach(&self.driven_mm[side])?;
-        within.then_some((touch.arc_a_mm - origin_mm) / self.pitch_mm)
+        let (begin_mm, end_mm) = self.passage_mm(tooth, touch.direction);
+        let within = touch.begins_mm() >= begin_mm && touch.ends_mm() <= end_mm;
+        within.then_some(touch.arc_a_mm / self.pitch_mm - (tooth as f64 + half))
     }
 }
 

@@ -18,17 +18,21 @@ pub struct Ellipse {
     k: f64,
     /// Parameter of the half map θ1 → E (eccentric anomaly): q = k/(1 + √(1 − k²)).
     q: f64,
+    /// √(1 − k²).
+    k_complement: f64,
     /// Arc length over a radian of E, mean over a turn, in centre distances.
     arc_mean: f64,
     /// arc(E) = arc_mean·E + Σ arc_sines[n−1] sin 2nE, in centre distances.
     arc_sines: Vec<f64>,
 }
 
-/// Derivatives of an elliptic pair by its eccentricity at fixed θ1, module and teeth.
+/// Derivatives of an elliptic or lobed pair by its eccentricity at fixed θ1, module and teeth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ByEccentricity {
-    /// ∂f/∂k, rad; ∂μ/∂k is −½ of it, because f = θ1 − 2μ.
+    /// ∂f/∂k, rad.
     pub(crate) theta2: f64,
+    /// ∂μ/∂k, rad.
+    pub(crate) mu: f64,
     /// ∂i21/∂k.
     pub(crate) ratio: f64,
     /// ∂ ln a/∂k: the perimeter stays π m Z.
@@ -48,7 +52,7 @@ impl Ellipse {
     pub(crate) fn new(k: f64) -> Self {
         let q = k / (1.0 + (1.0 - k * k).sqrt());
         let (arc_mean, arc_sines) = arc_series(k);
-        Self { k, q, arc_mean, arc_sines }
+        Self { k, q, k_complement: (1.0 - k * k).sqrt(), arc_mean, arc_sines }
     }
 
     /// Eccentricity k.
@@ -73,6 +77,8 @@ impl Ellipse {
             / nodes as f64;
         ByEccentricity {
             theta2: 2.0 * sin / denominator,
+            // f = θ1 − 2μ
+            mu: -sin / denominator,
             ratio: (-2.0 * k * denominator + 2.0 * (1.0 - k * k) * (cos - k)) / (denominator * denominator),
             relative_distance: -slope / self.arc_mean,
         }
@@ -157,23 +163,28 @@ impl PitchCurve for Ellipse {
 
     #[inline]
     fn roll(&self, theta1_rad: f64) -> Roll {
-        // One sine and cosine of θ1 for everything.
+        // One sine and cosine of θ1 for everything; f = θ1 − 2μ saves an arctangent.
         let (k, q) = (self.k, self.q);
         let (sin, cos) = theta1_rad.sin_cos();
         let inverse = 1.0 / (1.0 - 2.0 * k * cos + k * k);
         let ratio = (1.0 - k * k) * inverse;
-        let motion = Motion {
-            theta2_rad: theta1_rad + 2.0 * (k * sin / (1.0 - k * cos)).atan(),
-            ratio,
-            ratio_slope: -2.0 * k * sin * ratio * inverse,
-        };
+        // 1/(1 − k cos θ1) is r1/p
+        let radius = 1.0 / (1.0 - k * cos);
+        let tan_mu = -k * sin * radius;
+        let mu_rad = tan_mu.atan();
+        let motion =
+            Motion { theta2_rad: theta1_rad - 2.0 * mu_rad, ratio, ratio_slope: -2.0 * k * sin * ratio * inverse };
         let ratio_curvature = -2.0 * k * ratio * (cos - 4.0 * k * sin * sin * inverse) * inverse;
         let anomaly_rad = theta1_rad + 2.0 * (q * sin / (1.0 - q * cos)).atan();
-        Roll { motion, ratio_curvature, arc: self.arc_at_anomaly(anomaly_rad) }
+        // cos E = (cos θ1 − k)/(1 − k cos θ1), sin E = √(1 − k²) sin θ1/(1 − k cos θ1)
+        let (sin_anomaly, cos_anomaly) = (self.k_complement * sin * radius, (cos - k) * radius);
+        let twice = (2.0 * sin_anomaly * cos_anomaly, 1.0 - 2.0 * sin_anomaly * sin_anomaly);
+        Roll { motion, tan_mu, mu_rad, ratio_curvature, arc: self.arc_at_anomaly(anomaly_rad, twice) }
     }
 
     fn arc(&self, theta1_rad: f64) -> f64 {
-        self.arc_at_anomaly(moebius(self.q, theta1_rad))
+        let anomaly_rad = moebius(self.q, theta1_rad);
+        self.arc_at_anomaly(anomaly_rad, (2.0 * anomaly_rad).sin_cos())
     }
 
     fn radius_range(&self) -> (f64, f64) {
@@ -187,14 +198,13 @@ impl PitchCurve for Ellipse {
 }
 
 impl Ellipse {
-    /// Arc length from the eccentric anomaly E, in centre distances.
+    /// Arc length from the eccentric anomaly E and sin 2E, cos 2E, in centre distances.
     #[inline]
-    fn arc_at_anomaly(&self, anomaly_rad: f64) -> f64 {
+    fn arc_at_anomaly(&self, anomaly_rad: f64, (sin, cos): (f64, f64)) -> f64 {
         // Clenshaw for Σ b_n sin(n x), x = 2E
-        let (sin, cos) = (2.0 * anomaly_rad).sin_cos();
         let (mut b1, mut b2) = (0.0, 0.0);
         for &coefficient in self.arc_sines.iter().rev() {
-            (b1, b2) = (coefficient + 2.0 * cos * b1 - b2, b1);
+            (b1, b2) = ((coefficient - b2) + 2.0 * cos * b1, b1);
         }
         self.arc_mean * anomaly_rad + b1 * sin
     }

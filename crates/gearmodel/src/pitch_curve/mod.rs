@@ -14,7 +14,7 @@ pub(crate) mod shape;
 
 pub use circle::Circle;
 pub use ellipse::Ellipse;
-pub(crate) use ellipse::MAX_ECCENTRICITY;
+pub(crate) use ellipse::{ByEccentricity, MAX_ECCENTRICITY};
 pub use lobed::Lobed;
 pub use numeric::Numeric;
 pub(crate) use numeric::{CELLS, highest, refine};
@@ -35,10 +35,24 @@ pub struct Motion {
 pub struct Roll {
     /// Angle, ratio and its slope.
     pub motion: Motion,
+    /// tan μ = i21'/(i21 (1 + i21)), the tangent's inclination.
+    pub tan_mu: f64,
+    /// μ, rad.
+    pub mu_rad: f64,
     /// d²i21/dθ1², 1/rad².
     pub ratio_curvature: f64,
     /// Arc length of gear 1's curve from θ1 = 0, in centre distances.
     pub arc: f64,
+}
+
+impl Roll {
+    /// A rolling position from the ratio's derivatives and the arc length.
+    #[inline]
+    pub(crate) fn new(motion: Motion, ratio_curvature: f64, arc: f64) -> Self {
+        // r1 = a i/(1 + i), so tan μ = r1'/r1 = i'/(i (1 + i))
+        let tan_mu = motion.ratio_slope / (motion.ratio * (1.0 + motion.ratio));
+        Self { motion, tan_mu, mu_rad: tan_mu.atan(), ratio_curvature, arc }
+    }
 }
 
 /// The transmission of a closed pair of pitch curves at unit centre distance.
@@ -67,11 +81,7 @@ pub trait PitchCurve {
     /// Motion, curvature and arc length at once.
     #[inline]
     fn roll(&self, theta1_rad: f64) -> Roll {
-        Roll {
-            motion: self.motion(theta1_rad),
-            ratio_curvature: self.ratio_curvature(theta1_rad),
-            arc: self.arc(theta1_rad),
-        }
+        Roll::new(self.motion(theta1_rad), self.ratio_curvature(theta1_rad), self.arc(theta1_rad))
     }
 
     /// i21(θ1).
@@ -138,6 +148,17 @@ macro_rules! pitch_curves {
             }
         })+
     };
+}
+
+impl AnyCurve {
+    /// Derivatives by the eccentricity; `None` for curves without.
+    pub(crate) fn by_eccentricity(&self, theta1_rad: f64) -> Option<ByEccentricity> {
+        match self {
+            Self::Ellipse(curve) => Some(curve.by_eccentricity(theta1_rad)),
+            Self::Lobed(curve) => Some(curve.by_eccentricity(theta1_rad)),
+            Self::Circle(_) | Self::Numeric(_) => None,
+        }
+    }
 }
 
 pitch_curves! {

@@ -133,11 +133,7 @@ impl PitchCurve for Numeric {
     }
 
     fn roll(&self, theta1_rad: f64) -> Roll {
-        Roll {
-            motion: self.motion(theta1_rad),
-            ratio_curvature: self.ratio.curvature(theta1_rad),
-            arc: self.speed.integral(theta1_rad),
-        }
+        Roll::new(self.motion(theta1_rad), self.ratio.curvature(theta1_rad), self.speed.integral(theta1_rad))
     }
 
     fn radius_range(&self) -> (f64, f64) {

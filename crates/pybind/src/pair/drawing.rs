@@ -124,8 +124,8 @@ impl GearPair {
     /// Passes a pair whose teeth a rack can cut. Angles, TE and backlash need none of this.
     ///
     /// Raises:
-    ///     GeometryError: a concave pitch curve, undercut, a pointed tip, or a dedendum that reaches the axis; names gear,
-    ///         angle and limit.
+    ///     GeometryError: a concave pitch curve, undercut, a pointed tip, a dedendum that reaches the axis, or tips that run
+    ///         into the mate's feet; names gear, angle and limit. Only the first fault: :meth:`tooth_faults` has all.
     ///
     /// >>> import gearmodel as gm
     /// >>> gm.GearPair.circular(module_mm=3, teeth=(40, 12)).check_teeth()  # doctest: +ELLIPSIS
@@ -134,6 +134,15 @@ impl GearPair {
     /// gearmodel.GeometryError: ...gear 2...
     fn check_teeth(&self) -> Result<()> {
         Ok(self.model.pair.check_teeth()?)
+    }
+
+    /// Everything that is wrong with the teeth, each fault with its gear, angle and limit; empty for a pair that can be cut.
+    ///
+    /// >>> import gearmodel as gm
+    /// >>> len(gm.GearPair.circular(module_mm=3, teeth=(40, 12)).tooth_faults())    # undercut, and interference
+    /// 2
+    fn tooth_faults(&self) -> Vec<String> {
+        self.model.pair.tooth_faults().iter().map(ToString::to_string).collect()
     }
 
     /// Contact ratio of the driver's teeth: pitches of rolling between the tips of both gears, without errors.

@@ -52,31 +52,27 @@ fn waves(field: &'static str, given: Option<&Bound<'_, PyAny>>) -> Result<Vec<f6
     given.map_or(Ok(Vec::new()), |given| column(field, given))
 }
 
-/// The arguments that all kinds with teeth share.
-struct ToothArguments<'a, 'py> {
+/// Teeth and sizes from the arguments that all kinds with teeth share, in their order.
+fn tooth_spec(
     module_mm: f64,
-    teeth: &'a Bound<'py, PyAny>,
+    teeth: &Bound<'_, PyAny>,
     pressure_angle_deg: f64,
     centre_distance_mm: Option<f64>,
     backlash_mm: f64,
     face_width_mm: f64,
     addendum: f64,
     dedendum_clearance: f64,
-}
-
-impl ToothArguments<'_, '_> {
-    fn spec(self) -> Result<ToothSpec> {
-        Ok(ToothSpec {
-            module_mm: self.module_mm,
-            teeth: teeth(self.teeth)?,
-            pressure_angle_deg: self.pressure_angle_deg,
-            centre_distance_mm: self.centre_distance_mm,
-            backlash_mm: self.backlash_mm,
-            face_width_mm: self.face_width_mm,
-            addendum: self.addendum,
-            dedendum_clearance: self.dedendum_clearance,
-        })
-    }
+) -> Result<ToothSpec> {
+    Ok(ToothSpec {
+        module_mm,
+        teeth: self::teeth(teeth)?,
+        pressure_angle_deg,
+        centre_distance_mm,
+        backlash_mm,
+        face_width_mm,
+        addendum,
+        dedendum_clearance,
+    })
 }
 
 #[pymethods]
@@ -119,44 +115,27 @@ impl GearPair {
         addendum: f64,
         dedendum_clearance: f64,
     ) -> Result<Self> {
-        let teeth = ToothArguments {
-            module_mm,
-            teeth,
-            pressure_angle_deg,
-            centre_distance_mm,
-            backlash_mm,
-            face_width_mm,
-            addendum,
-            dedendum_clearance,
-        }
-        .spec()?;
+        #[rustfmt::skip]
+        let teeth = tooth_spec(
+            module_mm, teeth, pressure_angle_deg, centre_distance_mm, backlash_mm, face_width_mm, addendum, dedendum_clearance,
+        )?;
         Self::from_spec(PairSpec::Elliptical(teeth.with_eccentricity(eccentricity)))
     }
 
-    /// Identical elliptic gears, each turning about a focus: r1 = p/(1 - k cos theta1).
-    ///
-    /// The tooth condition, perimeter = pi m Z, fixes the size; closure fixes the centre distance.
+    /// Circular gears, of equal or different tooth numbers.
     ///
     /// Args:
     ///     module_mm: module m of the rack, mm.
-    ///     teeth: Z of both gears, or a pair of equal numbers.
-    ///     eccentricity: k of the pitch ellipse, 0 (circle) to below 1.
-    ///     pressure_angle_deg: alpha of the rack, deg.
-    ///     centre_distance_mm: that of the drawing, mm; checked against closure. None: the one that closes.
-    ///     backlash_mm: designed backlash of both gears together along the pitch curve, mm.
-    ///     face_width_mm: mm.
-    ///     addendum: in modules.
-    ///     dedendum_clearance: over the mate's addendum, in modules.
+    ///     teeth: Z of both gears, or (Z1, Z2).
+    ///     pressure_angle_deg, backlash_mm, face_width_mm, addendum, dedendum_clearance: as in :meth:`elliptical`.
+    ///     centre_distance_mm: that of the drawing, mm; checked against m (Z1 + Z2)/2. None: that one.
     ///
     /// Raises:
-    ///     GeometryError: a number outside its range, or a centre distance that does not close; the text gives the closure
-    ///         sum and the distance that closes.
+    ///     GeometryError: a number outside its range, or a centre distance that does not close.
     ///
     /// >>> import gearmodel as gm
-    /// >>> gm.GearPair.elliptical(module_mm=3, teeth=47, eccentricity=0.3287, centre_distance_mm=150)
-    /// Traceback (most recent call last):
-    /// ...
-    /// gearmodel.GeometryError: centre distance 150 mm does not close: the driven gear turns 0.928484 times a turn of the driver instead of 1.000000; this pitch curve closes at 144.999717 mm
+    /// >>> gm.GearPair.circular(module_mm=2, teeth=(20, 40)).centre_distance_mm
+    /// 60.0
     #[staticmethod]
     #[pyo3(signature = (*, module_mm, teeth, pressure_angle_deg=20.0, centre_distance_mm=None,
         backlash_mm=0.0, face_width_mm=30.0, addendum=1.0, dedendum_clearance=0.25))]
@@ -170,18 +149,11 @@ impl GearPair {
         addendum: f64,
         dedendum_clearance: f64,
     ) -> Result<Self> {
-        let teeth = ToothArguments {
-            module_mm,
-            teeth,
-            pressure_angle_deg,
-            centre_distance_mm,
-            backlash_mm,
-            face_width_mm,
-            addendum,
-            dedendum_clearance,
-        }
-        .spec()?;
-        Self::from_spec(PairSpec::Circular(teeth.into()))
+        #[rustfmt::skip]
+        let teeth = tooth_spec(
+            module_mm, teeth, pressure_angle_deg, centre_distance_mm, backlash_mm, face_width_mm, addendum, dedendum_clearance,
+        )?;
+        Self::from_spec(PairSpec::Circular(teeth))
     }
 
     /// Ellipses of higher order: r1 = p/(1 - k cos(n1 theta1)), n1 lobes driving n2.
@@ -214,17 +186,10 @@ impl GearPair {
         addendum: f64,
         dedendum_clearance: f64,
     ) -> Result<Self> {
-        let teeth = ToothArguments {
-            module_mm,
-            teeth,
-            pressure_angle_deg,
-            centre_distance_mm,
-            backlash_mm,
-            face_width_mm,
-            addendum,
-            dedendum_clearance,
-        }
-        .spec()?;
+        #[rustfmt::skip]
+        let teeth = tooth_spec(
+            module_mm, teeth, pressure_angle_deg, centre_distance_mm, backlash_mm, face_width_mm, addendum, dedendum_clearance,
+        )?;
         let lobes = (whole_lobes(1, lobes.0)?, whole_lobes(2, lobes.1)?);
         Self::from_spec(PairSpec::Free { teeth, curve: CurveSpec::Lobed { eccentricity, lobes } })
     }
@@ -262,17 +227,10 @@ impl GearPair {
         addendum: f64,
         dedendum_clearance: f64,
     ) -> Result<Self> {
-        let teeth = ToothArguments {
-            module_mm,
-            teeth,
-            pressure_angle_deg,
-            centre_distance_mm,
-            backlash_mm,
-            face_width_mm,
-            addendum,
-            dedendum_clearance,
-        }
-        .spec()?;
+        #[rustfmt::skip]
+        let teeth = tooth_spec(
+            module_mm, teeth, pressure_angle_deg, centre_distance_mm, backlash_mm, face_width_mm, addendum, dedendum_clearance,
+        )?;
         let (cosines, sines) = (waves("cosines", cosines)?, waves("sines", sines)?);
         Self::from_spec(PairSpec::Free { teeth, curve: CurveSpec::Fourier { cosines, sines } })
     }
@@ -309,17 +267,10 @@ impl GearPair {
         addendum: f64,
         dedendum_clearance: f64,
     ) -> Result<Self> {
-        let teeth = ToothArguments {
-            module_mm,
-            teeth,
-            pressure_angle_deg,
-            centre_distance_mm,
-            backlash_mm,
-            face_width_mm,
-            addendum,
-            dedendum_clearance,
-        }
-        .spec()?;
+        #[rustfmt::skip]
+        let teeth = tooth_spec(
+            module_mm, teeth, pressure_angle_deg, centre_distance_mm, backlash_mm, face_width_mm, addendum, dedendum_clearance,
+        )?;
         let (theta1_rad, radius) = (column("theta1_rad", theta1_rad)?, column("radius", radius)?);
         Self::from_spec(PairSpec::Free { teeth, curve: CurveSpec::Sampled { theta1_rad, radius } })
     }
@@ -356,17 +307,10 @@ impl GearPair {
         addendum: f64,
         dedendum_clearance: f64,
     ) -> Result<Self> {
-        let teeth = ToothArguments {
-            module_mm,
-            teeth,
-            pressure_angle_deg,
-            centre_distance_mm,
-            backlash_mm,
-            face_width_mm,
-            addendum,
-            dedendum_clearance,
-        }
-        .spec()?;
+        #[rustfmt::skip]
+        let teeth = tooth_spec(
+            module_mm, teeth, pressure_angle_deg, centre_distance_mm, backlash_mm, face_width_mm, addendum, dedendum_clearance,
+        )?;
         let (cosines, sines) = (waves("cosines", cosines)?, waves("sines", sines)?);
         Self::from_spec(PairSpec::Free { teeth, curve: CurveSpec::Transmission { cosines, sines } })
     }

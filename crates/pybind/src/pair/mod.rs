@@ -218,7 +218,7 @@ impl GearPair {
             PairSpec::Elliptical(spec) => {
                 tooth_call("elliptical", &spec.teeth_and_sizes(), &format!("eccentricity={:?}", spec.eccentricity))
             }
-            PairSpec::Circular(spec) => tooth_call("circular", &spec.teeth_and_sizes(), ""),
+            PairSpec::Circular(teeth) => tooth_call("circular", teeth, ""),
             PairSpec::Free { teeth, curve } => {
                 let own = match curve {
                     CurveSpec::Lobed { eccentricity, lobes } => {

@@ -2,30 +2,19 @@
 
 use serde_json::json;
 
-use super::curve::{Figures, Sampling, points, rows};
+use super::curve::{Figures, points, rows};
 use super::error::ModelError;
 use super::method::{Method, Predictor};
-use super::output::{Output, Report};
-use super::source::Source;
+use super::output::Report;
+use super::question::{Asked, Question};
 use super::table::{Column, Table};
 use crate::chart::{Chart, Ink, Mark, Panel, Series};
-use crate::quantity::TORQUE;
 
 /// Predicted backlash over θ1.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    source: Source,
-    /// How; several separated by commas stand side by side
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "common_normal")]
-    method: Vec<Method>,
-    /// Torque on the driven shaft in either sense, as `10Nm`
-    #[arg(long, default_value = "0Nm")]
-    load: String,
-    #[command(flatten)]
-    sampling: Sampling,
-    #[command(flatten)]
-    output: Output,
+    question: Question,
 }
 
 /// Runs the command.
@@ -33,12 +22,9 @@ pub struct Args {
 /// # Errors
 /// [`ModelError`] says what is asked for in vain.
 pub fn run(args: &Args) -> Result<(), ModelError> {
-    args.output.check(&[])?;
-    let load_nm = TORQUE.parse(&args.load)?;
-    let theta1_rad = args.sampling.angles_rad()?;
-    let pair = args.source.load()?;
+    let Asked { pair, load_nm, theta1_rad } = args.question.ask()?;
     let mut curves = Vec::new();
-    for method in &args.method {
+    for method in &args.question.method {
         let predictor = Predictor::new(&pair, *method, load_nm)?;
         let values_rad =
             theta1_rad.iter().map(|theta| predictor.backlash_rad(*theta)).collect::<Result<Vec<_>, _>>()?;
@@ -87,11 +73,11 @@ pub fn run(args: &Args) -> Result<(), ModelError> {
         })
         .collect();
     let panel = Panel {
-        x: args.sampling.into(),
+        x: args.question.sampling.into(),
         ..Panel::over_turn(format!("Backlash at the driven shaft, {load_nm} N·m"), "backlash / µrad", series)
     };
     let report = Report { text, json, table: Table { columns }, chart: Chart { panels: vec![panel] } };
-    Ok(args.output.deliver(report, &[])?)
+    Ok(args.question.output.deliver(report, &[])?)
 }
 
 /// The same as a length, b·r2, where the pair has teeth.

@@ -172,11 +172,12 @@ fn teeth(pair: &GearPair, theta1_rad: &[f64]) -> Vec<Finding> {
             radius_mm >= limit_mm,
         ));
     }
-    let cut = pair.check_teeth();
-    findings.push(match &cut {
-        Ok(()) => Finding::new("cutting by a rack", "convex, not undercut, not pointed".into(), "", true),
-        Err(fault) => Finding::new("cutting by a rack", fault.to_string(), "", false),
-    });
+    let faults = pair.tooth_faults();
+    if faults.is_empty() {
+        let passed = "convex, not undercut, not pointed, no interference";
+        findings.push(Finding::new("cutting by a rack", passed.into(), "", true));
+    }
+    findings.extend(faults.iter().map(|fault| Finding::new("cutting by a rack", fault.to_string(), "", false)));
     findings
 }
 

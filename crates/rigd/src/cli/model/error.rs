@@ -55,16 +55,6 @@ pub enum ModelError {
         /// Most.
         upper: u64,
     },
-    /// The grid is one of elliptic pairs.
-    #[error(
-        "{pair}: a sweep varies elliptic pairs, this one is {kind}; write kind = \"elliptical\" (eccentricity = 0 is circular), or use --set in a loop"
-    )]
-    SweepKind {
-        /// Which pair.
-        pair: String,
-        /// Its kind.
-        kind: &'static str,
-    },
     /// A study of nothing.
     #[error(
         "nothing scatters; give --sigma KEY=SIGMA or --uniform KEY=WIDTH, for instance --sigma e1_mm=0.01 --uniform phi1_rad=3.1416"

@@ -104,6 +104,23 @@ impl<'a> Predictor<'a> {
         }
     }
 
+    /// TE at many angles, rad: by exact contact they cost less together than one by one.
+    ///
+    /// # Errors
+    /// As [`Predictor::te_rad`].
+    pub fn te_curve_rad(&self, theta1_rad: &[f64], direction: Direction) -> Result<Vec<f64>, ModelError> {
+        let Some(Contact::Rigid(contact)) = &self.contact else {
+            return theta1_rad.iter().map(|theta| self.te_rad(*theta, direction)).collect();
+        };
+        let mut te_rad = contact
+            .te_curve_rad(theta1_rad, direction)
+            .map_err(|source| ModelError::Contact { pair: self.name.to_owned(), source })?;
+        for (te_rad, theta) in te_rad.iter_mut().zip(theta1_rad) {
+            *te_rad += self.model.windup_rad(&self.model.pair.at(*theta), direction, self.load_nm);
+        }
+        Ok(te_rad)
+    }
+
     /// Backlash at θ1, rad at the driven shaft: TE_cw − TE_ccw; of the printed equations their periodic part alone.
     ///
     /// # Errors

@@ -12,6 +12,7 @@ mod parameter;
 mod parquet;
 mod phases;
 mod progress;
+mod question;
 mod source;
 mod sweep;
 pub(super) mod table;

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
+use gearmodel::Direction;
 use gearmodel::sensitivity::Parameter;
 use gearmodel::sweep::{Sweep, SweepFigure, SweepMethod, SweepTable};
-use gearmodel::{Direction, PairSpec};
 use serde_json::json;
 
 use super::error::{ModelError, check_count};
@@ -115,16 +115,12 @@ pub fn run(args: &Args) -> Result<Exit, ModelError> {
     let load_nm = TORQUE.parse(&args.load)?;
     let points = check_count("--points", args.points.into(), (8, 100_000))? as usize;
     let loaded = args.source.load()?;
-    let PairSpec::Elliptical(gears) = &loaded.file.gears else {
-        return Err(ModelError::SweepKind { pair: loaded.name.clone(), kind: loaded.model.pair.kind() });
-    };
     let mut results: Vec<(Of, SweepTable)> = Vec::new();
     let cells: usize = args.over.iter().map(|(_, values)| values.len()).product();
     let progress = Progress::new(cells * args.of.len(), "sweep");
     for (index, of) in args.of.iter().enumerate() {
         let sweep = Sweep {
-            // The centre distance follows the curve that is swept.
-            gears: gearmodel::EllipticalSpec { centre_distance_mm: None, ..gears.clone() },
+            gears: loaded.file.gears.clone(),
             errors: loaded.model.errors,
             load_nm,
             over: args.over.clone(),

@@ -3,37 +3,26 @@
 use gearmodel::Direction;
 use serde_json::json;
 
-use super::curve::{Figures, Sampling, points, rows};
+use super::curve::{Figures, points, rows};
 use super::error::ModelError;
 use super::method::{Method, Predictor};
-use super::output::{Output, Report};
-use super::source::Source;
+use super::output::Report;
+use super::question::{Asked, Question};
 use super::table::{Column, Table};
 use crate::chart::{Chart, Ink, Mark, Panel, Series};
 use crate::cli::directions::Directions;
-use crate::quantity::TORQUE;
 
 /// Predicted transmission error over θ1.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    source: Source,
-    /// How; several separated by commas stand side by side
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "common_normal")]
-    method: Vec<Method>,
+    question: Question,
     /// Senses of the driver
     #[arg(long, value_enum, default_value = "both")]
     direction: Directions,
-    /// Torque on the driven shaft, as `10Nm`: winds up the documented compliances
-    #[arg(long, default_value = "0Nm")]
-    load: String,
     /// Subtract the value at θ1 = 0; `published` keeps its printed start terms either way
     #[arg(long)]
     relative_to_start: bool,
-    #[command(flatten)]
-    sampling: Sampling,
-    #[command(flatten)]
-    output: Output,
 }
 
 struct Curve {
@@ -48,12 +37,9 @@ struct Curve {
 /// # Errors
 /// [`ModelError`] says what is asked for in vain.
 pub fn run(args: &Args) -> Result<(), ModelError> {
-    args.output.check(&[])?;
-    let load_nm = TORQUE.parse(&args.load)?;
-    let theta1_rad = args.sampling.angles_rad()?;
-    let pair = args.source.load()?;
+    let Asked { pair, load_nm, theta1_rad } = args.question.ask()?;
     let mut curves = Vec::new();
-    for method in &args.method {
+    for method in &args.question.method {
         let predictor = Predictor::new(&pair, *method, load_nm)?;
         for direction in args.direction.list() {
             let start_rad = match method {
@@ -62,10 +48,8 @@ pub fn run(args: &Args) -> Result<(), ModelError> {
                 _ if args.relative_to_start => predictor.te_rad(0.0, direction)?,
                 _ => 0.0,
             };
-            let values_rad = theta1_rad
-                .iter()
-                .map(|theta| predictor.te_rad(*theta, direction).map(|te_rad| te_rad - start_rad))
-                .collect::<Result<Vec<_>, _>>()?;
+            let mut values_rad = predictor.te_curve_rad(&theta1_rad, direction)?;
+            values_rad.iter_mut().for_each(|te_rad| *te_rad -= start_rad);
             let figures = Figures::of(&theta1_rad, &values_rad);
             curves.push(Curve { method: *method, direction, values_rad, figures });
         }
@@ -75,8 +59,10 @@ pub fn run(args: &Args) -> Result<(), ModelError> {
     for curve in &curves {
         text += &format!("\nTE {}, {}\n{}", curve.direction, curve.method.name(), curve.figures.text());
     }
-    let listed: Vec<_> =
-        curves.iter().map(|curve| (name(curve, args.method.len(), " "), curve.values_rad.as_slice())).collect();
+    let listed: Vec<_> = curves
+        .iter()
+        .map(|curve| (name(curve, args.question.method.len(), " "), curve.values_rad.as_slice()))
+        .collect();
     text += &format!("\n{}", rows(&theta1_rad, &listed));
 
     let mut columns = vec![
@@ -84,7 +70,7 @@ pub fn run(args: &Args) -> Result<(), ModelError> {
         Column::numbers("theta2_nominal_rad", theta1_rad.iter().map(|theta| pair.model.pair.theta2(*theta)).collect()),
     ];
     columns.extend(curves.iter().map(|curve| {
-        Column::numbers(format!("te_{}_rad", name(curve, args.method.len(), "_")), curve.values_rad.clone())
+        Column::numbers(format!("te_{}_rad", name(curve, args.question.method.len(), "_")), curve.values_rad.clone())
     }));
     let json = json!({
         "schema": "rigd.model.te/1",
@@ -101,18 +87,18 @@ pub fn run(args: &Args) -> Result<(), ModelError> {
         .iter()
         .enumerate()
         .map(|(index, curve)| Series {
-            name: format!("TE {}", name(curve, args.method.len(), ", ")),
-            ink: ink(curve.direction, args.method.len(), index),
+            name: format!("TE {}", name(curve, args.question.method.len(), ", ")),
+            ink: ink(curve.direction, args.question.method.len(), index),
             mark: Mark::Line,
             points: points(&theta1_rad, &curve.values_rad),
         })
         .collect();
     let panel = Panel {
-        x: args.sampling.into(),
+        x: args.question.sampling.into(),
         ..Panel::over_turn(format!("Transmission error at {load_nm} N·m"), "TE / µrad", series)
     };
     let report = Report { text, json, table: Table { columns }, chart: Chart { panels: vec![panel] } };
-    Ok(args.output.deliver(report, &[])?)
+    Ok(args.question.output.deliver(report, &[])?)
 }
 
 /// The sense, and the method where there are several.
