@@ -35,12 +35,14 @@ impl Effect for MeshStiffnessVariation {
         shapes
     }
 
-    fn neighbours(&self, shape: &Shape) -> Vec<Shape> {
+    fn neighbours(&self, shape: &Shape, step: f64) -> Vec<Shape> {
         let [duty, start] = shape[..] else { return Vec::new() };
         let mut shapes = Vec::new();
-        for wider in [-0.08, -0.04, -0.02, 0.0, 0.02, 0.04, 0.08] {
-            for later in [-0.06, -0.03, -0.01, 0.0, 0.01, 0.03, 0.06] {
-                shapes.push(vec![(duty + wider).clamp(0.02, 0.98), start + later]);
+        for wider in [-0.07, 0.0, 0.07] {
+            for later in [-0.05, 0.0, 0.05] {
+                if wider != 0.0 || later != 0.0 {
+                    shapes.push(vec![(duty + step * wider).clamp(0.02, 0.98), start + step * later]);
+                }
             }
         }
         shapes

@@ -123,8 +123,8 @@ pub trait Effect: Sync {
         vec![Vec::new()]
     }
 
-    /// Shapes near one that was found best, for a finer search.
-    fn neighbours(&self, _shape: &Shape) -> Vec<Shape> {
+    /// Shapes about one that was found best; `step` is 1 for the grid's own distance and falls as the search closes in.
+    fn neighbours(&self, _shape: &Shape, _step: f64) -> Vec<Shape> {
         Vec::new()
     }
 

@@ -33,9 +33,8 @@ impl Effect for Slip {
         (0..10).map(|n| vec![0.1 * f64::from(n) * largest]).collect()
     }
 
-    fn neighbours(&self, shape: &Shape) -> Vec<Shape> {
-        let step = 0.02 * shape[0].max(5.0);
-        [-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0].into_iter().map(|n| vec![(shape[0] + n * step).max(0.0)]).collect()
+    fn neighbours(&self, shape: &Shape, step: f64) -> Vec<Shape> {
+        [-0.8, -0.4, 0.4, 0.8].into_iter().map(|part| vec![(shape[0] + part * step * shape[0].max(1.5)).max(0.0)]).collect()
     }
 
     fn evolves(&self) -> bool {

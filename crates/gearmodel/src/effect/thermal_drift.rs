@@ -24,8 +24,8 @@ impl Effect for ThermalDrift {
         [0.08, 0.16, 0.3, 0.6, 1.2, 3.0].into_iter().map(|part| vec![part * plan.duration_s.max(1e-3)]).collect()
     }
 
-    fn neighbours(&self, shape: &Shape) -> Vec<Shape> {
-        [0.6, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 1.65].into_iter().map(|factor| vec![factor * shape[0]]).collect()
+    fn neighbours(&self, shape: &Shape, step: f64) -> Vec<Shape> {
+        [-0.6, -0.3, 0.3, 0.6].into_iter().map(|part| vec![shape[0] * (part * step).exp()]).collect()
     }
 
     fn evolves(&self) -> bool {

@@ -43,10 +43,10 @@ impl Effect for ToothDamage {
         shapes
     }
 
-    fn neighbours(&self, shape: &Shape) -> Vec<Shape> {
-        [0.6, 0.8, 0.9, 1.1, 1.25, 1.6]
+    fn neighbours(&self, shape: &Shape, step: f64) -> Vec<Shape> {
+        [-0.6, -0.3, 0.3, 0.6]
             .into_iter()
-            .map(|factor| vec![shape[0], shape[1], (shape[2] * factor).clamp(0.05, 1.5)])
+            .map(|part| vec![shape[0], shape[1], (shape[2] * (1.0 + part * step)).clamp(0.05, 1.5)])
             .collect()
     }
 

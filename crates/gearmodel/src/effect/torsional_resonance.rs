@@ -47,12 +47,15 @@ impl Effect for TorsionalResonance {
         shapes
     }
 
-    fn neighbours(&self, shape: &Shape) -> Vec<Shape> {
+    fn neighbours(&self, shape: &Shape, step: f64) -> Vec<Shape> {
         let [kind, f_hz, zeta] = shape[..] else { return Vec::new() };
         let mut shapes = Vec::new();
-        for factor in [0.85, 0.92, 0.96, 0.98, 1.0, 1.02, 1.04, 1.08, 1.16] {
-            for damping in [0.6, 1.0, 1.6] {
-                shapes.push(vec![kind, f_hz * factor, (zeta * damping).clamp(0.005, 0.5)]);
+        for higher in [-0.16, -0.08, 0.0, 0.08, 0.16] {
+            for softer in [-0.8, 0.0, 0.8] {
+                if higher != 0.0 || softer != 0.0 {
+                    let damping = (zeta * f64::exp(softer * step.sqrt())).clamp(0.005, 0.5);
+                    shapes.push(vec![kind, f_hz * f64::exp(higher * step), damping]);
+                }
             }
         }
         shapes

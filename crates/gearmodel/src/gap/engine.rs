@@ -22,6 +22,10 @@ use crate::{Direction, NominalModel};
 const RUN_RATIOS: [f64; 6] = [0.02, 0.08, 0.3, 1.0, 3.0, 10.0];
 /// How far such a ratio usually is from what it is first taken to be: a factor of e to this.
 const RUN_RATIO_SPREAD: f64 = 1.5;
+/// Blocks smaller than this part of the largest are left out while its shape is moved.
+const LARGE: f64 = 0.12;
+/// Steps in which shapes are moved, in parts of their grid's.
+const SHARPENING_STEPS: [f64; 6] = [1.0, 0.6, 0.3, 0.15, 0.07, 0.03];
 /// Rounds of: search, look for events, sharpen shapes, estimate the noise anew.
 const ROUNDS: usize = 3;
 /// Log Bayes factor from which a sub-divisional error is taken off.
@@ -120,8 +124,10 @@ pub fn diagnose_with_nominal(
             .map(|lines| lines as f64)
     });
     let quantum = recordings.iter().find_map(|r| interpolation::counts_per_rev(&r.columns().theta2_rad));
-    let nominal = Nominal::new(Rig::new(model.clone(), lines, quantum));
+    let mut nominal = Nominal::new(Rig::new(model.clone(), lines, quantum));
     let parts: Vec<Recording<'_>> = recordings.iter().flat_map(Recording::split).collect();
+    let lines = interpolation::search_lines(&parts, &nominal, lines);
+    nominal.set_lines(lines);
     let reduced: Vec<(ReducedRun, LinePhase)> = parts
         .par_iter()
         .map(|part| {
@@ -240,6 +246,8 @@ struct Engine<'a> {
     whitened: Whitened,
     best: Option<Model>,
     models: Vec<Model>,
+    /// The larger blocks with their shapes moved to where they fit best: a start for the next search.
+    large: Option<Vec<usize>>,
     /// Tones and steps that were found and taken into the pool.
     events: Vec<Pattern>,
 }
@@ -262,7 +270,7 @@ impl<'a> Engine<'a> {
         pool.add(&grid, rig, causes);
         let noise = Noise::estimate(&grid, &pool, &[]);
         let whitened = Whitened { gram: nalgebra::DMatrix::zeros(0, 0), log_det: 0.0 };
-        Self { rig, runs, grid, pool, options, noise, whitened, best: None, models: Vec::new(), events: Vec::new() }
+        Self { rig, runs, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None, events: Vec::new() }
     }
 
     /// Search, look for events, sharpen, estimate the noise anew, until nothing changes.
@@ -293,15 +301,17 @@ impl<'a> Engine<'a> {
 
     /// Searches under the present noise, from nothing and from the last best model.
     fn search(&mut self, last: bool) {
-        let start = self.best.as_ref().map(|m| m.fit.set.clone());
+        let starts: Vec<Vec<usize>> =
+            self.best.as_ref().map(|m| m.fit.set.clone()).into_iter().chain(self.large.take()).collect();
         self.whitened = self.noise.whiten(&self.grid, &self.pool);
         let mut search = Search::new(&self.pool, &self.whitened, &self.options.known);
         let mut best = search.run();
-        if let Some(set) = start
-            && let Some(other) = search.climb(set, true)
-            && best.as_ref().is_none_or(|b| other.score > b.score)
-        {
-            best = Some(other);
+        for set in starts {
+            if let Some(other) = search.climb(set, true)
+                && best.as_ref().is_none_or(|b| other.score > b.score)
+            {
+                best = Some(other);
+            }
         }
         if last {
             if let Some(model) = &best {
@@ -350,37 +360,101 @@ impl<'a> Engine<'a> {
         self.noise.run_ratio = chosen.1;
     }
 
-    /// Adds shapes about those of the best model, and keeps them where they fit better.
+    /// Moves the shapes of the best model's larger effects to where they fit best, the small ones left out: what a shape on
+    /// a grid misses must not be made up by other effects. Then both sets compete.
     fn sharpen(&mut self) -> bool {
         let Some(best) = self.best.clone() else { return false };
-        let mut causes = Vec::new();
-        for (n, b) in best.fit.set.iter().enumerate() {
-            let block = &self.pool.blocks[*b];
-            let Cause::Effect { effect, number, shape, cost_nats } = &block.cause else { continue };
-            let (effect, number, cost_nats) = (*effect, *number, *cost_nats);
-            let mut shapes = effect.neighbours(shape);
-            if let Some(refined) = effect.refine(self.rig, shape, &self.raw(&best, n).beta) {
-                shapes.push(refined);
+        let largest = (0..best.fit.set.len()).map(|n| self.rms_rad(&best.fit, n)).fold(0.0, f64::max);
+        let mut set: Vec<usize> = (0..best.fit.set.len())
+            .filter(|n| self.rms_rad(&best.fit, *n) > LARGE * largest)
+            .map(|n| best.fit.set[n])
+            .collect();
+        let before = set.clone();
+        for step in SHARPENING_STEPS {
+            let mut moved = false;
+            for n in 0..set.len() {
+                moved |= self.sharpen_block(&mut set, n, step);
             }
-            for shape in shapes {
-                let known = self.pool.blocks.iter().any(
-                    |b| matches!(&b.cause, Cause::Effect { number: m, shape: s, .. } if *m == number && *s == shape),
-                );
-                if !known {
-                    causes.push(Cause::Effect { effect, number, shape, cost_nats });
-                }
+            if !moved && step < 0.2 {
+                break;
             }
         }
-        if causes.is_empty() {
+        set.sort_unstable();
+        let changed = set != before;
+        self.large = Some(set);
+        changed
+    }
+
+    /// Tries the shapes about that of block `n` of a set, and puts the best in its place.
+    fn sharpen_block(&mut self, set: &mut [usize], n: usize, step: f64) -> bool {
+        let Cause::Effect { effect, number, shape, cost_nats } = self.pool.blocks[set[n]].cause.clone() else { return false };
+        let Some(now) = evidence::fit(&self.pool, &self.whitened, set, &[]) else { return false };
+        let mut shapes = effect.neighbours(&shape, step);
+        let beta = self.amplitudes_of(&now, n).beta;
+        shapes.extend(effect.refine(self.rig, &shape, &beta));
+        let fresh: Vec<Cause> = shapes
+            .into_iter()
+            .filter(|shape| {
+                !self.pool.blocks.iter().any(
+                    |b| matches!(&b.cause, Cause::Effect { number: m, shape: s, .. } if *m == number && s == shape),
+                )
+            })
+            .map(|shape| Cause::Effect { effect, number, shape, cost_nats })
+            .collect();
+        if fresh.is_empty() {
             return false;
         }
-        self.pool.add(&self.grid, self.rig, causes);
-        true
+        let tried = self.pool.add(&self.grid, self.rig, fresh);
+        self.whitened = self.noise.whiten_set(&self.grid, &self.pool, &self.whitened, set, &tried);
+        let mut winner = (now.log_evidence, set[n]);
+        for block in &tried {
+            let mut other = set.to_vec();
+            other[n] = *block;
+            if let Some(fit) = evidence::fit(&self.pool, &self.whitened, &other, &now.scales_rad)
+                && fit.log_evidence > winner.0
+            {
+                winner = (fit.log_evidence, *block);
+            }
+        }
+        let moved = winner.1 != set[n];
+        set[n] = winner.1;
+        // Only the winner stays: the pool must not grow with every step.
+        let kept = self.pool.keep_of(&tried, winner.1);
+        if moved {
+            set[n] = kept.unwrap_or(set[n]);
+        }
+        self.whitened = self.whitened.first(self.pool.width());
+        if let Some(kept) = kept {
+            self.whitened = self.noise.whiten_set(&self.grid, &self.pool, &self.whitened, set, &[kept]);
+        }
+        moved
+    }
+
+    /// The best model's blocks without what evolves from revolution to revolution.
+    fn steady_set(&self) -> Vec<usize> {
+        let Some(best) = &self.best else { return Vec::new() };
+        let steady = |b: &usize| match &self.pool.blocks[*b].cause {
+            Cause::Effect { effect, .. } => !effect.evolves(),
+            Cause::Unknown(pattern) => !pattern.evolves() && !matches!(pattern, Pattern::RunLevels { .. }),
+        };
+        best.fit.set.iter().copied().filter(steady).collect()
+    }
+
+    /// The amplitudes of that set alone.
+    fn steady_amplitudes(&self) -> Vec<(usize, f64)> {
+        evidence::fit(&self.pool, &self.whitened, &self.steady_set(), &[]).map(|fit| fit.amplitudes()).unwrap_or_default()
+    }
+
+    /// RMS of the trace of block `n` of a fit, rad.
+    fn rms_rad(&self, fit: &evidence::Fit, n: usize) -> f64 {
+        let place = fit.place(&self.pool, n);
+        fit.mean.rows(place.start, place.len()).norm()
     }
 
     fn look_for_events(&mut self) -> bool {
         let amplitudes = self.best.as_ref().map(|m| m.fit.amplitudes()).unwrap_or_default();
-        let found = events::find(&self.grid, &self.runs, &self.pool, &self.noise, &amplitudes);
+        let steady = self.steady_amplitudes();
+        let found = events::find(&self.grid, &self.runs, &self.pool, &self.noise, &amplitudes, &steady);
         let mut causes = Vec::new();
         for pattern in found.patterns {
             if !self.events.contains(&pattern) {
@@ -396,22 +470,56 @@ impl<'a> Engine<'a> {
                     |b| matches!(&b.cause, Cause::Effect { number: m, shape: s, .. } if *m == number && *s == times_s),
                 );
                 if !known {
-                    let cost_nats = events::STEP_NATS * times_s.len() as f64;
+                    let [any, each] = events::STEPS_COST_NATS;
+                    let cost_nats = any + each * times_s.len() as f64;
                     causes.push(Cause::Effect { effect, number, shape: times_s, cost_nats });
                 }
             }
         }
         let changed = !causes.is_empty();
-        self.pool.add(&self.grid, self.rig, causes);
+        for block in self.pool.add(&self.grid, self.rig, causes) {
+            self.weigh_event(block);
+        }
         changed
+    }
+
+    /// Steps and tones pass for scatter until they are taken off: a model with the event is weighed under the noise that it
+    /// leaves, against the best model under its own.
+    fn weigh_event(&mut self, block: usize) {
+        let steady = self.steady_set();
+        let mut set = steady;
+        set.push(block);
+        set.sort_unstable();
+        let whitened = self.noise.whiten(&self.grid, &self.pool);
+        let Some(fit) = evidence::fit(&self.pool, &whitened, &set, &[]) else { return };
+        let kept = (self.noise.clone(), std::mem::replace(&mut self.whitened, whitened), self.best.take());
+        let score = Search::new(&self.pool, &self.whitened, &self.options.known).model(set.clone(), None).map(|m| m.score);
+        self.best = Some(Model { fit, score: score.unwrap_or(f64::NEG_INFINITY) });
+        self.estimate_noise();
+        self.whitened = self.noise.whiten(&self.grid, &self.pool);
+        let mut search = Search::new(&self.pool, &self.whitened, &self.options.known);
+        let with_event = search.climb(set, true);
+        let before = kept.2.as_ref().map_or(f64::NEG_INFINITY, |m| m.score);
+        match with_event {
+            Some(model) if model.score > before => self.best = Some(model),
+            _ => {
+                (self.noise, self.whitened, self.best) = kept;
+                // The pool has grown since.
+                self.whitened = self.noise.whiten(&self.grid, &self.pool);
+            }
+        }
     }
 
     /// Amplitudes of block `n` of a model in the effect's own units.
     fn raw(&self, model: &Model, n: usize) -> Estimate {
-        let block = &self.pool.blocks[model.fit.set[n]];
-        let place = model.fit.place(&self.pool, n);
-        let mean = model.fit.mean.rows(place.start, place.len());
-        let covariance = model.fit.covariance.view((place.start, place.start), (place.len(), place.len()));
+        self.amplitudes_of(&model.fit, n)
+    }
+
+    fn amplitudes_of(&self, fit: &evidence::Fit, n: usize) -> Estimate {
+        let block = &self.pool.blocks[fit.set[n]];
+        let place = fit.place(&self.pool, n);
+        let mean = fit.mean.rows(place.start, place.len());
+        let covariance = fit.covariance.view((place.start, place.start), (place.len(), place.len()));
         Estimate {
             beta: (&block.transform * mean).iter().copied().collect(),
             covariance: &block.transform * covariance * block.transform.transpose(),

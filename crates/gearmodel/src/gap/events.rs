@@ -14,8 +14,11 @@ use super::pool::Pool;
 use super::reduce::ReducedRun;
 use super::unknown::Pattern;
 
-/// What a step costs, nats: its place is open, and steps are rare.
-pub(super) const STEP_NATS: f64 = 6.0;
+/// What a step costs on the way through the sectors, nats: its place is open.
+const STEP_NATS: f64 = 4.0;
+/// What steps cost as an effect, nats: to look for them, and each; less than on the way, since neighbouring places do as
+/// well.
+pub(super) const STEPS_COST_NATS: [f64; 2] = [6.0, 3.0];
 /// Evidence from which steps are taken into the pool, nats.
 const STEPS_FOUND_NATS: f64 = 8.0;
 /// Sectors a revolution.
@@ -41,19 +44,33 @@ pub struct Events {
     pub steps: Vec<Vec<f64>>,
 }
 
-/// Looks for events in what a model (column, amplitude) leaves.
+/// Looks for events in what a model (column, amplitude) leaves; `steady` is the same without what accumulates, which could
+/// have taken the steps for a drift.
 #[must_use]
-pub fn find(grid: &Grid, runs: &[ReducedRun], pool: &Pool, noise: &Noise, amplitudes: &[(usize, f64)]) -> Events {
+pub fn find(
+    grid: &Grid,
+    runs: &[ReducedRun],
+    pool: &Pool,
+    noise: &Noise,
+    amplitudes: &[(usize, f64)],
+    steady: &[(usize, f64)],
+) -> Events {
     let trace = pool.trace(grid, amplitudes);
-    let rest: Vec<f64> = grid.rho_rad.iter().zip(&trace).map(|(y, m)| y - m).collect();
-    let sectors = sectors(grid, noise, &rest);
     let mut steps = Vec::new();
-    for tied in [false, true] {
-        if let Some(times_s) = find_steps(&sectors, tied)
-            && !steps.contains(&times_s)
-        {
-            steps.push(times_s);
+    let mut look = |trace: &[f64]| {
+        let rest: Vec<f64> = grid.rho_rad.iter().zip(trace).map(|(y, m)| y - m).collect();
+        let sectors = sectors(grid, noise, &rest);
+        for tied in [false, true] {
+            if let Some(times_s) = find_steps(&sectors, tied)
+                && !steps.contains(&times_s)
+            {
+                steps.push(times_s);
+            }
         }
+    };
+    look(&trace);
+    if steady.len() < amplitudes.len() {
+        look(&pool.trace(grid, steady));
     }
     Events { patterns: find_tone(grid, runs, noise, &trace).into_iter().collect(), steps }
 }

@@ -1,6 +1,87 @@
-//! The encoders' own grain: counts a revolution from the angles' steps.
+//! The encoders' own grain: counts a revolution from the angles' steps, lines from the residual's spectrum over the angle.
 
 use std::f64::consts::TAU;
+
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+
+use super::nominal::Nominal;
+use crate::Direction;
+use crate::recording::Recording;
+
+/// Cells a turn of the search for lines: lines up to half of that are seen.
+const CELLS: usize = 1 << 18;
+/// Fewest and most lines looked for; teeth and their harmonics lie below.
+const LINES: std::ops::Range<usize> = 700..CELLS / 3;
+/// Log odds, over all lines looked for, from which a peak is taken for a disc's lines.
+const FOUND_NATS: f64 = 7.0;
+/// The residual is freed of its mean over this part of a turn, or over so many samples where they are sparse.
+const WINDOW_RAD: f64 = TAU / 360.0;
+const WINDOW_SAMPLES: usize = 4;
+
+/// Lines of the input and output encoder where the samples show a wave of their period; `known` are left as they are.
+#[must_use]
+pub fn search_lines(parts: &[Recording<'_>], nominal: &Nominal, known: [Option<f64>; 2]) -> [Option<f64>; 2] {
+    if known.iter().all(Option::is_some) {
+        return known;
+    }
+    let mut series = [vec![Complex::new(0.0, 0.0); CELLS], vec![Complex::new(0.0, 0.0); CELLS]];
+    let mut power = [0.0; 2];
+    for part in parts {
+        let columns = part.columns();
+        let load_nm = columns.load_nm.mean();
+        let direction = columns.direction.unwrap_or(Direction::Ccw);
+        let pair = nominal.rig().pair();
+        let seen: Vec<usize> = (0..part.samples())
+            .filter(|n| columns.theta1_rad[*n].is_finite() && columns.theta2_rad[*n].is_finite())
+            .collect();
+        let mut sums = vec![0.0];
+        let mut rho = Vec::with_capacity(seen.len());
+        for n in &seen {
+            let theta1_rad = columns.theta1_rad[*n];
+            let te_rad = columns.theta2_rad[*n] - pair.theta2(theta1_rad) - nominal.te_rad(theta1_rad, direction, load_nm);
+            rho.push(te_rad);
+            sums.push(sums[rho.len() - 1] + te_rad);
+        }
+        let (mut low, mut high) = (0, 0);
+        for (at, n) in seen.iter().enumerate() {
+            let theta1_rad = columns.theta1_rad[*n];
+            while (theta1_rad - columns.theta1_rad[seen[low]]).abs() > WINDOW_RAD && low + WINDOW_SAMPLES < at {
+                low += 1;
+            }
+            while high + 1 < seen.len()
+                && ((columns.theta1_rad[seen[high]] - theta1_rad).abs() < WINDOW_RAD || high < at + WINDOW_SAMPLES)
+            {
+                high += 1;
+            }
+            let deviation = rho[at] - (sums[high + 1] - sums[low]) / (high + 1 - low) as f64;
+            for (encoder, (angle_rad, gain)) in
+                [(theta1_rad, -pair.ratio(theta1_rad)), (columns.theta2_rad[*n], 1.0)].into_iter().enumerate()
+            {
+                let cell = ((angle_rad / TAU).rem_euclid(1.0) * CELLS as f64) as usize % CELLS;
+                series[encoder][cell].re += gain * deviation;
+                power[encoder] += gain * gain * deviation * deviation;
+            }
+        }
+    }
+    let transform = FftPlanner::new().plan_fft_forward(CELLS);
+    let mut lines = known;
+    for (encoder, mut values) in series.into_iter().enumerate() {
+        if known[encoder].is_some() || power[encoder] <= 0.0 {
+            continue;
+        }
+        transform.process(&mut values);
+        let nats = |order: usize| values[order].norm_sqr() / power[encoder] - (LINES.len() as f64).ln();
+        let strongest = LINES.max_by(|a, b| nats(*a).total_cmp(&nats(*b))).unwrap_or(LINES.start);
+        if nats(strongest) > FOUND_NATS {
+            // A wave of order 2 of the line may be the stronger one.
+            let half = strongest / 2;
+            let of_half = strongest % 2 == 0 && half >= LINES.start && nats(half) > 0.0;
+            lines[encoder] = Some(if of_half { half } else { strongest } as f64);
+        }
+    }
+    lines
+}
 
 /// Angles looked at.
 const LOOKED_AT: usize = 4000;

@@ -82,6 +82,15 @@ pub struct Whitened {
     pub log_det: f64,
 }
 
+impl Whitened {
+    /// The same without the columns from `width` on.
+    #[must_use]
+    pub fn first(&self, width: usize) -> Self {
+        let width = width.min(self.gram.nrows());
+        Self { gram: self.gram.view((0, 0), (width, width)).into_owned(), log_det: self.log_det }
+    }
+}
+
 impl Noise {
     /// Estimates the scatter from what differs between revolutions of a run after the model `amplitudes` (column,
     /// amplitude) is taken off.
@@ -155,7 +164,8 @@ impl Noise {
     #[must_use]
     pub fn floor_rad2(&self) -> f64 {
         let between = |n: usize| self.order_rad2[n] * (1.0 + self.run_ratio[usize::from(n > 0)]);
-        (0..KINDS).map(|n| members(n) * between(n)).sum()
+        // The ramps describe how the levels pass on, not more of them.
+        (0..=ORDERS).map(|n| members(n) * between(n)).sum()
     }
 
     /// XᵀV⁻¹X and log det V.
@@ -164,7 +174,27 @@ impl Noise {
         self.whiten_runs(grid, pool, None)
     }
 
-    /// The same of one run alone where `only` names it.
+    /// `known` grown to the pool's width, with the entries that a fit of `set` with one of `added` needs.
+    #[must_use]
+    pub fn whiten_set(&self, grid: &Grid, pool: &Pool, known: &Whitened, set: &[usize], added: &[usize]) -> Whitened {
+        let mut columns = vec![super::evidence::RESIDUAL, super::evidence::ZERO];
+        columns.extend(set.iter().chain(added).flat_map(|b| pool.blocks[*b].columns.clone()));
+        columns.sort_unstable();
+        columns.dedup();
+        let part = self.whiten_runs(grid, pool, Some(&columns));
+        let width = pool.width();
+        let old = known.gram.nrows();
+        let mut gram = DMatrix::zeros(width, width);
+        gram.view_mut((0, 0), (old, old)).copy_from(&known.gram);
+        for (m, a) in columns.iter().enumerate() {
+            for (n, b) in columns.iter().enumerate() {
+                gram[(*a, *b)] = part.gram[(m, n)];
+            }
+        }
+        Whitened { gram, log_det: known.log_det }
+    }
+
+    /// The same of some columns only.
     #[must_use]
     pub fn whiten_runs(&self, grid: &Grid, pool: &Pool, only: Option<&[usize]>) -> Whitened {
         let width = pool.width();

@@ -49,6 +49,11 @@ impl Nominal {
         &self.rig
     }
 
+    /// Notes the encoders' lines.
+    pub fn set_lines(&mut self, lines: [Option<f64>; 2]) {
+        self.rig.lines = lines;
+    }
+
     /// Nominal TE, rad.
     #[must_use]
     pub fn te_rad(&self, theta1_rad: f64, direction: Direction, load_nm: f64) -> f64 {

@@ -153,6 +153,26 @@ impl Pool {
         numbers
     }
 
+    /// Drops the blocks that were added last, all but one of them; returns its new number where it is one of these.
+    pub fn keep_of(&mut self, last: &[usize], keep: usize) -> Option<usize> {
+        let first = *last.first()?;
+        let old = self.blocks[first].columns.start;
+        let kept = last.contains(&keep).then(|| self.blocks[keep].clone());
+        self.blocks.truncate(first);
+        let columns: Vec<usize> =
+            (0..old).chain(kept.iter().flat_map(|block| block.columns.clone())).collect();
+        let mut values: Vec<Option<Values>> = std::mem::take(&mut self.values).into_iter().map(Some).collect();
+        self.values = columns.iter().filter_map(|c| values[*c].take()).collect();
+        self.products = DMatrix::from_fn(columns.len(), columns.len(), |m, n| self.products[(columns[m], columns[n])]);
+        for waves in &mut self.waves {
+            *waves = DMatrix::from_fn(waves.nrows(), columns.len(), |m, n| waves[(m, columns[n])]);
+        }
+        let mut block = kept?;
+        block.columns = old..old + block.columns.len();
+        self.blocks.push(block);
+        Some(first)
+    }
+
     fn unit_columns(&self, grid: &Grid, rig: &Rig, cause: &Cause) -> Option<(Vec<Values>, DMatrix<f64>)> {
         let (width, evolves) = match cause {
             Cause::Effect { effect, shape, .. } => (effect.width(rig, shape), effect.evolves()),

@@ -12,7 +12,10 @@ const SHARPNESS: f64 = 0.85;
 /// Prior odds of a sub-divisional error.
 const LINE_ODDS: f64 = 0.04;
 /// A remainder under this part of what was found is the found effects' own inexactness.
-const INEXACT: f64 = 0.04;
+const INEXACT: f64 = 0.05;
+
+/// Largest probability of what may be no more than that.
+const INEXACT_PROBABILITY: f64 = 0.2;
 
 /// What is known of one effect.
 struct Finding {
@@ -63,9 +66,20 @@ impl Engine<'_> {
                 _ => None,
             };
         }
+        let total_rad = findings
+            .iter()
+            .filter(|f| f.probability > NAMED && f.block.is_some_and(|b| best.fit.set.contains(&b)))
+            .map(|f| f.rms_rad * f.rms_rad)
+            .sum::<f64>()
+            .sqrt();
+        for finding in &mut findings {
+            if finding.block.is_some() && finding.rms_rad < INEXACT * total_rad {
+                finding.probability = finding.probability.min(INEXACT_PROBABILITY);
+            }
+        }
         findings.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.number.cmp(&b.number)));
 
-        let (groups, verdict) = self.verdict(&findings, &attribution, best);
+        let (groups, verdict) = self.verdict(&findings, &attribution, best, total_rad);
         let unknown = self.unknown(&attribution, best);
         let mut verdict = verdict;
         if unknown.probability > NAMED {
@@ -262,7 +276,13 @@ impl Engine<'_> {
     }
 
     /// Groups and what is named.
-    fn verdict(&self, findings: &[Finding], attribution: &Attribution, best: &Model) -> (Vec<Group>, Vec<Verdict>) {
+    fn verdict(
+        &self,
+        findings: &[Finding],
+        attribution: &Attribution,
+        best: &Model,
+        total_rad: f64,
+    ) -> (Vec<Group>, Vec<Verdict>) {
         let mut groups = Vec::new();
         let mut verdict = Vec::new();
         let mut done: Vec<usize> = Vec::new();
@@ -287,6 +307,11 @@ impl Engine<'_> {
                     .map(|(_, w)| w)
                     .sum::<f64>()
                     .min(1.0)
+            };
+            let probability = if finding.rms_rad < INEXACT * total_rad && finding.block.is_some() {
+                probability.min(INEXACT_PROBABILITY)
+            } else {
+                probability
             };
             let in_best = finding.block.is_none()
                 || best.fit.set.iter().any(|b| {
@@ -331,7 +356,7 @@ impl Engine<'_> {
         let rms_rad = square.sqrt();
         // Effects are linearised and their shapes lie on grids: a small part of them may stay behind.
         let inexact = square > 0.0 && rms_rad < INEXACT * known.sqrt();
-        let probability = if inexact { attribution.unknown.min(0.4) } else { attribution.unknown };
+        let probability = if inexact { attribution.unknown.min(INEXACT_PROBABILITY) } else { attribution.unknown };
         let location = strongest.filter(|_| probability > 0.1).map(|(_, pattern)| UnknownLocation {
             description: pattern.describe(),
             signature: pattern.signature(),
