@@ -27,9 +27,8 @@ impl Estimate {
         let amplitude = sine.hypot(cosine);
         let variance = |a: f64, b: f64| {
             let c = &self.covariance;
-            let value = a * a * c[(first, first)]
-                + 2.0 * a * b * c[(first, first + 1)]
-                + b * b * c[(first + 1, first + 1)];
+            let value =
+                a * a * c[(first, first)] + 2.0 * a * b * c[(first, first + 1)] + b * b * c[(first + 1, first + 1)];
             value.max(0.0).sqrt()
         };
         let scale = amplitude.max(f64::MIN_POSITIVE);

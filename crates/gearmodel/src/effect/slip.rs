@@ -34,7 +34,10 @@ impl Effect for Slip {
     }
 
     fn neighbours(&self, shape: &Shape, step: f64) -> Vec<Shape> {
-        [-0.8, -0.4, 0.4, 0.8].into_iter().map(|part| vec![(shape[0] + part * step * shape[0].max(1.5)).max(0.0)]).collect()
+        [-0.8, -0.4, 0.4, 0.8]
+            .into_iter()
+            .map(|part| vec![(shape[0] + part * step * shape[0].max(1.5)).max(0.0)])
+            .collect()
     }
 
     fn evolves(&self) -> bool {
@@ -48,8 +51,12 @@ impl Effect for Slip {
     fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
         let [threshold_nm] = shape[..] else { return };
         let ledger = &at.ledger;
-        row[0] =
-            -ledger.load_nm.iter().zip(&ledger.signed_rev).map(|(load, rev)| (load - threshold_nm).max(0.0) * rev).sum::<f64>();
+        row[0] = -ledger
+            .load_nm
+            .iter()
+            .zip(&ledger.signed_rev)
+            .map(|(load, rev)| (load - threshold_nm).max(0.0) * rev)
+            .sum::<f64>();
     }
 
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {

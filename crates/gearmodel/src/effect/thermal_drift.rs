@@ -38,9 +38,6 @@ impl Effect for ThermalDrift {
     }
 
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
-        vec![
-            Parameter::number("da_mm", found.beta[0], found.std(0), "mm"),
-            Parameter::grid("tau_s", shape[0], "s"),
-        ]
+        vec![Parameter::number("da_mm", found.beta[0], found.std(0), "mm"), Parameter::grid("tau_s", shape[0], "s")]
     }
 }

@@ -27,9 +27,8 @@ impl Effect for ToothDamage {
     fn signature_of(&self, rig: &Rig, shape: &Shape) -> Signature {
         let [tooth, flank, width] = shape[..] else { return self.signature() };
         let half = if flank > 0.0 { 0.0 } else { 0.5 };
-        let at = |pitches: f64| {
-            rig.pair().theta1_at_arc_length((pitches + half) * PI * rig.pair().module_mm()).to_degrees()
-        };
+        let at =
+            |pitches: f64| rig.pair().theta1_at_arc_length((pitches + half) * PI * rig.pair().module_mm()).to_degrees();
         Signature { sector_deg: Some([at(tooth - width), at(tooth + width)]), ..self.signature() }
     }
 
@@ -75,7 +74,12 @@ impl Effect for ToothDamage {
             Parameter::grid("tooth", tooth, ""),
             Parameter::number("depth_mm", found.beta[0], found.std(0), "mm"),
             Parameter::grid("width", width, "pitches"),
-            Parameter { name: "flank", value: Value::Text(if flank > 0.0 { "ccw" } else { "cw" }), std: None, unit: "" },
+            Parameter {
+                name: "flank",
+                value: Value::Text(if flank > 0.0 { "ccw" } else { "cw" }),
+                std: None,
+                unit: "",
+            },
         ]
     }
 }

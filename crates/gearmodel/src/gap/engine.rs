@@ -4,17 +4,18 @@ use rayon::prelude::*;
 
 use super::attribute::{self, Attribution, twins};
 use super::diagnosis::{Confusability, Diagnosis, EffectFinding, Group, Unknown, UnknownLocation, Verdict};
+use super::events::Tone;
 use super::grid::Grid;
 use super::line_phase::{LineError, LinePhase};
-use super::nominal::Nominal;
 use super::noise::{FIRST_RUN_RATIO, Noise, Whitened};
+use super::nominal::Nominal;
 use super::pool::{Cause, Pool};
 use super::predict::{Found, FoundEffect};
 use super::reduce::{ReducedRun, Reducer, Sample};
 use super::search::{Model, Search};
 use super::unknown::Pattern;
 use super::{events, evidence, interpolation, locate, next, shrink};
-use crate::effect::{Estimate, LIBRARY, Rig, by_name};
+use crate::effect::{Accumulates, Estimate, LIBRARY, Rig, by_name};
 use crate::recording::Recording;
 use crate::{Direction, NominalModel};
 
@@ -22,6 +23,8 @@ use crate::{Direction, NominalModel};
 const RUN_RATIOS: [f64; 6] = [0.02, 0.08, 0.3, 1.0, 3.0, 10.0];
 /// How far such a ratio usually is from what it is first taken to be: a factor of e to this.
 const RUN_RATIO_SPREAD: f64 = 1.5;
+/// Evidence from which a wave that does not close with the turn is taken into the pool, nats.
+const WANDERING_NATS: f64 = 8.0;
 /// Blocks smaller than this part of the largest are left out while its shape is moved.
 const LARGE: f64 = 0.12;
 /// Steps in which shapes are moved, in parts of their grid's.
@@ -50,7 +53,9 @@ pub enum GapError {
     #[error("no recording was given: at least 1 is needed")]
     NoRecording,
     /// Recordings without a stretch in which the driver turns.
-    #[error("{recordings} recordings hold {points} stretches of motion together: at least {needed} are needed (a quarter degree each)")]
+    #[error(
+        "{recordings} recordings hold {points} stretches of motion together: at least {needed} are needed (a quarter degree each)"
+    )]
     TooShort {
         /// Recordings given.
         recordings: usize,
@@ -176,7 +181,8 @@ pub fn diagnose_runs(
         return Err(GapError::TooShort { recordings, points, needed: FEWEST_POINTS });
     }
     let found_lines = take_off_lines(&mut runs, lines.as_ref(), options);
-    let mut engine = Engine::new(nominal.rig(), runs, options);
+    let tones = events::take_off_tones(nominal.rig(), &mut runs);
+    let mut engine = Engine::new(nominal.rig(), &runs, tones, options);
     engine.solve();
     engine.report(&found_lines).ok_or(GapError::Singular)
 }
@@ -184,12 +190,25 @@ pub fn diagnose_runs(
 /// Finds sub-divisional errors and takes them off the points, so that they are no noise for the rest.
 fn take_off_lines(runs: &mut [ReducedRun], lines: Option<&LinePhase>, options: &Options) -> Vec<LineError> {
     let names = ["encoder1_interpolation", "encoder2_interpolation"];
-    let found: Vec<LineError> = (0..2)
-        .filter(|encoder| !options.exclude.iter().any(|name| name == names[*encoder]))
-        .flat_map(|encoder| [1, 2].map(|order| (encoder, order)))
-        .filter_map(|(encoder, order)| lines?.pair(encoder, order))
-        .filter(|error| error.log_bayes_factor > LINE_NATS)
-        .collect();
+    let mut found: Vec<LineError> = Vec::new();
+    if let Some(lines) = lines {
+        // The strongest first, and each judged on what the others leave.
+        let mut left = lines.clone();
+        let open: Vec<(usize, usize)> = (0..2)
+            .filter(|encoder| !options.exclude.iter().any(|name| name == names[*encoder]))
+            .flat_map(|encoder| [1, 2].map(|order| (encoder, order)))
+            .collect();
+        while let Some(error) = open
+            .iter()
+            .filter(|(encoder, order)| !found.iter().any(|f| f.encoder == *encoder && f.order == *order))
+            .filter_map(|(encoder, order)| left.pair(*encoder, *order))
+            .max_by(|a, b| a.log_bayes_factor.total_cmp(&b.log_bayes_factor))
+            .filter(|error| error.log_bayes_factor > LINE_NATS)
+        {
+            left.take_off(&error);
+            found.push(error);
+        }
+    }
     let explained_rad2: f64 = found.iter().map(|error| error.explained_rad2).sum();
     let within_rad2: f64 = runs.iter().map(|run| run.within_rad2).sum();
     let samples: f64 = runs.iter().map(|run| run.samples).sum();
@@ -223,7 +242,7 @@ fn join(mut runs: Vec<ReducedRun>) -> Vec<ReducedRun> {
             let speed = (last.theta1_rad - before.points[0].theta1_rad).abs()
                 / (last.time_s - before.points[0].time_s).max(1e-9);
             let pause_s = first.time_s - last.time_s;
-            if same && step >= 0.0 && step < 0.02 && pause_s * speed < 0.04 {
+            if same && (0.0..0.02).contains(&step) && pause_s * speed < 0.04 {
                 before.points.extend(run.points);
                 before.within_rad2 += run.within_rad2;
                 before.samples += run.samples;
@@ -238,7 +257,7 @@ fn join(mut runs: Vec<ReducedRun>) -> Vec<ReducedRun> {
 /// The state of a diagnosis.
 struct Engine<'a> {
     rig: &'a Rig,
-    runs: Vec<ReducedRun>,
+    tones: Vec<Tone>,
     grid: Grid,
     pool: Pool,
     options: &'a Options,
@@ -248,13 +267,13 @@ struct Engine<'a> {
     models: Vec<Model>,
     /// The larger blocks with their shapes moved to where they fit best: a start for the next search.
     large: Option<Vec<usize>>,
-    /// Tones and steps that were found and taken into the pool.
+    /// Steps that were found and taken into the pool.
     events: Vec<Pattern>,
 }
 
 impl<'a> Engine<'a> {
-    fn new(rig: &'a Rig, runs: Vec<ReducedRun>, options: &'a Options) -> Self {
-        let grid = Grid::new(rig, &runs);
+    fn new(rig: &'a Rig, runs: &[ReducedRun], tones: Vec<Tone>, options: &'a Options) -> Self {
+        let grid = Grid::new(rig, runs);
         let mut pool = Pool::new(&grid);
         let mut causes = Vec::new();
         for (number, effect) in LIBRARY.iter().copied().enumerate() {
@@ -270,17 +289,26 @@ impl<'a> Engine<'a> {
         pool.add(&grid, rig, causes);
         let noise = Noise::estimate(&grid, &pool, &[]);
         let whitened = Whitened { gram: nalgebra::DMatrix::zeros(0, 0), log_det: 0.0 };
-        Self { rig, runs, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None, events: Vec::new() }
+        Self {
+            rig,
+            tones,
+            grid,
+            pool,
+            options,
+            noise,
+            whitened,
+            best: None,
+            models: Vec::new(),
+            large: None,
+            events: Vec::new(),
+        }
     }
 
     /// Search, look for events, sharpen, estimate the noise anew, until nothing changes.
     fn solve(&mut self) {
-        let t0 = std::time::Instant::now();
         for round in 0..ROUNDS {
-            if std::env::var("GAP_TRACE").is_ok() { eprintln!("t {:?}", t0.elapsed()); }
             self.search(false);
-            if std::env::var("GAP_TRACE").is_ok() { eprintln!("searched {:?}", t0.elapsed()); }
-            let changed = self.sharpen() | self.look_for_events();
+            let changed = self.sharpen() | self.look_for_events() | (round == 0 && self.look_for_wandering_waves());
             let before = self.noise.floor_rad2();
             self.estimate_noise();
             let moved = (self.noise.floor_rad2() / before).ln().abs();
@@ -321,15 +349,6 @@ impl<'a> Engine<'a> {
             best = self.models.first().cloned();
         }
         self.best = best;
-        if std::env::var("GAP_TRACE").is_ok() {
-            let mut search = Search::new(&self.pool, &self.whitened, &self.options.known);
-            let empty = search.model(Vec::new(), None).map_or(0.0, |m| m.score);
-            if let Some(model) = &self.best {
-                eprintln!("places {} revs {} blocks {} cols {} white {:.2} ratio {:?} orders {:?}", self.grid.places.len(), self.grid.revolutions.len(), self.pool.blocks.len(), self.pool.width(), 1e6*self.noise.white_rad2.sqrt(), self.noise.run_ratio, self.noise.order_rad2.map(|v| (1e8*v.sqrt()).round()/100.0));
-                let names: Vec<String> = model.fit.set.iter().enumerate().map(|(n, b)| { let place = model.fit.place(&self.pool, n); let rms = 1e6*model.fit.mean.rows(place.start, place.len()).norm(); match &self.pool.blocks[*b].cause { Cause::Effect { effect, shape, .. } => format!("{} {:?} {rms:.1}", effect.name(), if shape.len() > 6 { vec![shape.len() as f64] } else { shape.clone() }), Cause::Unknown(p) => format!("{} {rms:.1}", p.describe()) } }).collect();
-                eprintln!("   gain {:.1}: {names:?}", model.score - empty);
-            }
-        }
     }
 
     /// The scatter between runs that the best model leaves, weighed on a grid.
@@ -387,7 +406,9 @@ impl<'a> Engine<'a> {
 
     /// Tries the shapes about that of block `n` of a set, and puts the best in its place.
     fn sharpen_block(&mut self, set: &mut [usize], n: usize, step: f64) -> bool {
-        let Cause::Effect { effect, number, shape, cost_nats } = self.pool.blocks[set[n]].cause.clone() else { return false };
+        let Cause::Effect { effect, number, shape, cost_nats } = self.pool.blocks[set[n]].cause.clone() else {
+            return false;
+        };
         let Some(now) = evidence::fit(&self.pool, &self.whitened, set, &[]) else { return false };
         let mut shapes = effect.neighbours(&shape, step);
         let beta = self.amplitudes_of(&now, n).beta;
@@ -430,19 +451,23 @@ impl<'a> Engine<'a> {
         moved
     }
 
-    /// The best model's blocks without what evolves from revolution to revolution.
+    /// The best model's blocks without what moves the level from revolution to revolution or run to run.
     fn steady_set(&self) -> Vec<usize> {
         let Some(best) = &self.best else { return Vec::new() };
         let steady = |b: &usize| match &self.pool.blocks[*b].cause {
-            Cause::Effect { effect, .. } => !effect.evolves(),
-            Cause::Unknown(pattern) => !pattern.evolves() && !matches!(pattern, Pattern::RunLevels { .. }),
+            Cause::Effect { effect, shape, .. } => effect.signature_of(self.rig, shape).accumulates == Accumulates::No,
+            Cause::Unknown(pattern) => {
+                !matches!(pattern, Pattern::RunLevels { .. } | Pattern::Level { .. } | Pattern::Step { .. })
+            }
         };
         best.fit.set.iter().copied().filter(steady).collect()
     }
 
     /// The amplitudes of that set alone.
     fn steady_amplitudes(&self) -> Vec<(usize, f64)> {
-        evidence::fit(&self.pool, &self.whitened, &self.steady_set(), &[]).map(|fit| fit.amplitudes()).unwrap_or_default()
+        evidence::fit(&self.pool, &self.whitened, &self.steady_set(), &[])
+            .map(|fit| fit.amplitudes())
+            .unwrap_or_default()
     }
 
     /// RMS of the trace of block `n` of a fit, rad.
@@ -454,7 +479,7 @@ impl<'a> Engine<'a> {
     fn look_for_events(&mut self) -> bool {
         let amplitudes = self.best.as_ref().map(|m| m.fit.amplitudes()).unwrap_or_default();
         let steady = self.steady_amplitudes();
-        let found = events::find(&self.grid, &self.runs, &self.pool, &self.noise, &amplitudes, &steady);
+        let found = events::find(&self.grid, &self.pool, &self.noise, &amplitudes, &steady);
         let mut causes = Vec::new();
         for pattern in found.patterns {
             if !self.events.contains(&pattern) {
@@ -483,17 +508,59 @@ impl<'a> Engine<'a> {
         changed
     }
 
+    /// Looks for waves over the driver's angle that do not close with its turn, and takes the best into the pool where it is worth it.
+    fn look_for_wandering_waves(&mut self) -> bool {
+        let (low, high) = self
+            .grid
+            .places
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), at| (l.min(at.theta1_rad), h.max(at.theta1_rad)));
+        let mut step = 1.0;
+        let mut patterns = Pattern::wandering((high - low) / std::f64::consts::TAU);
+        if let [Pattern::Order { order: a, .. }, Pattern::Order { order: b, .. }, ..] = &patterns[..] {
+            step = b - a;
+        }
+        let mut kept: Option<usize> = None;
+        for _ in 0..3 {
+            if patterns.is_empty() {
+                break;
+            }
+            let added = self.pool.add(&self.grid, self.rig, patterns.drain(..).map(Cause::Unknown).collect());
+            self.whitened = self.noise.whiten(&self.grid, &self.pool);
+            let set: Vec<usize> = self.best.as_ref().map(|m| m.fit.set.clone()).unwrap_or_default();
+            let candidates: Vec<usize> = kept.into_iter().chain(added.iter().copied()).collect();
+            let Some(fit) = evidence::fit(&self.pool, &self.whitened, &set, &[]) else { return false };
+            let gains = evidence::scan(&self.pool, &self.whitened, &fit, &candidates);
+            let best = candidates.iter().zip(&gains).max_by(|a, b| a.1.total_cmp(b.1));
+            let Some((&block, _)) = best.filter(|(_, gain)| **gain > WANDERING_NATS) else {
+                self.pool.keep_of(&candidates, usize::MAX);
+                self.whitened = self.whitened.first(self.pool.width());
+                return false;
+            };
+            kept = self.pool.keep_of(&candidates, block);
+            if let Some(Cause::Unknown(pattern)) = kept.map(|b| self.pool.blocks[b].cause.clone()) {
+                patterns = pattern.nearer(step);
+            }
+            step *= 0.5;
+        }
+        self.whitened = self.noise.whiten(&self.grid, &self.pool);
+        if let Some(block) = kept {
+            self.weigh_event(block);
+        }
+        kept.is_some()
+    }
+
     /// Steps and tones pass for scatter until they are taken off: a model with the event is weighed under the noise that it
     /// leaves, against the best model under its own.
     fn weigh_event(&mut self, block: usize) {
-        let steady = self.steady_set();
-        let mut set = steady;
+        let mut set = self.steady_set();
         set.push(block);
         set.sort_unstable();
         let whitened = self.noise.whiten(&self.grid, &self.pool);
         let Some(fit) = evidence::fit(&self.pool, &whitened, &set, &[]) else { return };
         let kept = (self.noise.clone(), std::mem::replace(&mut self.whitened, whitened), self.best.take());
-        let score = Search::new(&self.pool, &self.whitened, &self.options.known).model(set.clone(), None).map(|m| m.score);
+        let score =
+            Search::new(&self.pool, &self.whitened, &self.options.known).model(set.clone(), None).map(|m| m.score);
         self.best = Some(Model { fit, score: score.unwrap_or(f64::NEG_INFINITY) });
         self.estimate_noise();
         self.whitened = self.noise.whiten(&self.grid, &self.pool);

@@ -11,14 +11,18 @@ use rustfft::num_complex::Complex;
 use super::grid::Grid;
 use super::noise::{Noise, waves};
 use super::pool::Pool;
-use super::reduce::ReducedRun;
+use super::reduce::{Point, ReducedRun};
 use super::unknown::Pattern;
+use crate::effect::Rig;
+use std::f64::consts::TAU;
 
 /// What a step costs on the way through the sectors, nats: its place is open.
 const STEP_NATS: f64 = 4.0;
-/// What steps cost as an effect, nats: to look for them, and each; less than on the way, since neighbouring places do as
-/// well.
-pub(super) const STEPS_COST_NATS: [f64; 2] = [6.0, 3.0];
+/// What steps cost as an effect, nats: to look for them, and each, whose place was chosen to a fraction of a degree.
+pub(super) const STEPS_COST_NATS: [f64; 2] = [6.0, 6.5];
+/// Most single steps of any size looked for, and the evidence from which one is taken into the pool, nats.
+const SINGLE_STEPS: usize = 3;
+const SINGLE_STEP_NATS: f64 = 14.0;
 /// Evidence from which steps are taken into the pool, nats.
 const STEPS_FOUND_NATS: f64 = 8.0;
 /// Sectors a revolution.
@@ -34,37 +38,37 @@ const SIZE_RATIO: f64 = 1.26;
 const TONE_STEPS: usize = 1 << 17;
 /// Log odds from which a tone is taken into the pool.
 const TONE_NATS: f64 = 6.0;
+/// Most tones taken off.
+const MOST_TONES: usize = 3;
+/// Neighbours on either side that a tone must stand out of.
+const NEIGHBOURS: usize = 100;
+/// Part of the scatter that a tone must make.
+const LEAST_TONE_SHARE: f64 = 0.002;
 
 /// What was found.
 #[derive(Clone, Debug, Default)]
 pub struct Events {
-    /// Tones.
+    /// Single steps of any size.
     pub patterns: Vec<Pattern>,
     /// Times of steps, s since the campaign's start.
     pub steps: Vec<Vec<f64>>,
 }
 
-/// Looks for events in what a model (column, amplitude) leaves; `steady` is the same without what accumulates, which could
+/// Looks for steps in what a model (column, amplitude) leaves; `steady` is the same without what accumulates, which could
 /// have taken the steps for a drift.
 #[must_use]
-pub fn find(
-    grid: &Grid,
-    runs: &[ReducedRun],
-    pool: &Pool,
-    noise: &Noise,
-    amplitudes: &[(usize, f64)],
-    steady: &[(usize, f64)],
-) -> Events {
+pub fn find(grid: &Grid, pool: &Pool, noise: &Noise, amplitudes: &[(usize, f64)], steady: &[(usize, f64)]) -> Events {
     let trace = pool.trace(grid, amplitudes);
-    let mut steps = Vec::new();
+    let mut steps: Vec<Vec<f64>> = Vec::new();
     let mut look = |trace: &[f64]| {
         let rest: Vec<f64> = grid.rho_rad.iter().zip(trace).map(|(y, m)| y - m).collect();
         let sectors = sectors(grid, noise, &rest);
         for tied in [false, true] {
-            if let Some(times_s) = find_steps(&sectors, tied)
-                && !steps.contains(&times_s)
-            {
-                steps.push(times_s);
+            if let Some((times_s, size_rad)) = find_steps(&sectors, tied) {
+                let times_s = sharpen(grid, &rest, &times_s, size_rad);
+                if !steps.contains(&times_s) {
+                    steps.push(times_s);
+                }
             }
         }
     };
@@ -72,7 +76,43 @@ pub fn find(
     if steady.len() < amplitudes.len() {
         look(&pool.trace(grid, steady));
     }
-    Events { patterns: find_tone(grid, runs, noise, &trace).into_iter().collect(), steps }
+    let rest: Vec<f64> = grid.rho_rad.iter().zip(&trace).map(|(y, m)| y - m).collect();
+    Events { patterns: single_steps(grid, noise, &rest), steps }
+}
+
+/// Steps of any size, one after the other, each where it takes most off the sectors' residual.
+fn single_steps(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Pattern> {
+    let sectors = sectors(grid, noise, rest);
+    // Neighbouring sectors of a turn share its level: as many independent values as half turns.
+    let share = 2.0 / SECTORS as f64;
+    let mut left: Vec<f64> = sectors.iter().map(|s| s.mean_rad).collect();
+    let mut found = Vec::new();
+    for _ in 0..SINGLE_STEPS {
+        let total: f64 = sectors.iter().map(|s| 1.0 / s.variance_rad2).sum();
+        let sum: f64 = sectors.iter().zip(&left).map(|(s, y)| y / s.variance_rad2).sum();
+        let (mut after, mut after_sum) = (total, sum);
+        let mut best = (0.0, 0, 0.0);
+        for (n, (sector, y)) in sectors.iter().zip(&left).enumerate() {
+            if n > 0 {
+                let before = total - after;
+                let step_rad = after_sum / after - (sum - after_sum) / before;
+                let gain = 0.5 * share * step_rad * step_rad * after * before / total;
+                if gain > best.0 {
+                    best = (gain, n, step_rad);
+                }
+            }
+            after -= 1.0 / sector.variance_rad2;
+            after_sum -= y / sector.variance_rad2;
+        }
+        let (gain, at, step_rad) = best;
+        if gain < SINGLE_STEP_NATS {
+            break;
+        }
+        let refined = sharpen(grid, rest, &[sectors[at].start_s], step_rad);
+        found.extend(refined.into_iter().map(|time_s| Pattern::Step { time_s }));
+        left[at..].iter_mut().for_each(|y| *y -= step_rad);
+    }
+    found
 }
 
 /// Mean of a sector of a revolution.
@@ -94,7 +134,8 @@ fn sectors(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Sector> {
         let size = ordered.len().div_ceil(SECTORS).max(1);
         for chunk in ordered.chunks(size) {
             let weight: f64 = chunk.iter().map(|p| grid.weight[*p]).sum();
-            let mean = |value: &dyn Fn(usize) -> f64| chunk.iter().map(|p| grid.weight[*p] * value(*p)).sum::<f64>() / weight;
+            let mean =
+                |value: &dyn Fn(usize) -> f64| chunk.iter().map(|p| grid.weight[*p] * value(*p)).sum::<f64>() / weight;
             sectors.push(Sector {
                 run: revolution.run,
                 start_s: grid.places[chunk[0]].time_s,
@@ -106,8 +147,57 @@ fn sectors(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Sector> {
     sectors
 }
 
-/// Times of steps of one size, where they are worth their cost.
-fn find_steps(sectors: &[Sector], tied: bool) -> Option<Vec<f64>> {
+/// Moves each step to where the places about it say: a step has a sharp edge, and one that lies off by a sector fits worse
+/// than none.
+fn sharpen(grid: &Grid, rest: &[f64], times_s: &[f64], size_rad: f64) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..grid.places.len()).collect();
+    order.sort_by(|a, b| grid.places[*a].time_s.total_cmp(&grid.places[*b].time_s));
+    let half = grid.bins / SECTORS * 3 / 2;
+    let mut found: Vec<f64> = times_s
+        .iter()
+        .enumerate()
+        .map(|(n, time_s)| {
+            let centre = order.partition_point(|p| grid.places[*p].time_s < *time_s);
+            // Not past the neighbouring steps: each window holds one edge.
+            let bound = |other: Option<&f64>, open: usize| {
+                other
+                    .filter(|t| (*t - time_s).abs() > 1e-9)
+                    .map_or(open, |t| order.partition_point(|p| grid.places[*p].time_s < 0.5 * (t + time_s)))
+            };
+            let low = bound(n.checked_sub(1).and_then(|m| times_s.get(m)), 0).max(centre.saturating_sub(half));
+            let high = bound(times_s.get(n + 1), order.len()).min(centre + half);
+            if high < low + 8 {
+                return *time_s;
+            }
+            let window = &order[low..high];
+            // Size of all steps at this time.
+            let together = times_s.iter().filter(|t| (*t - time_s).abs() < 1e-9).count() as f64;
+            let step_rad = size_rad * together;
+            let mean = window.iter().map(|p| grid.weight[*p] * rest[*p]).sum::<f64>()
+                / window.iter().map(|p| grid.weight[*p]).sum::<f64>();
+            let total: f64 = window.iter().map(|p| grid.weight[*p]).sum();
+            let (mut after_weight, mut after_sum) = (total, 0.0);
+            let mut best = (f64::NEG_INFINITY, centre);
+            for (m, p) in window.iter().enumerate() {
+                // Least squares with a free level: gain = 2Δ Σ_after (e − mean) − Δ² w_after w_before/w.
+                let gain =
+                    2.0 * step_rad * -after_sum - step_rad * step_rad * after_weight * (total - after_weight) / total;
+                if gain > best.0 {
+                    best = (gain, low + m);
+                }
+                after_weight -= grid.weight[*p];
+                after_sum += grid.weight[*p] * (rest[*p] - mean);
+            }
+            let at = best.1.clamp(1, order.len() - 1);
+            0.5 * (grid.places[order[at - 1]].time_s + grid.places[order[at]].time_s)
+        })
+        .collect();
+    found.sort_by(f64::total_cmp);
+    found
+}
+
+/// Times of steps of one size and the size, where they are worth their cost.
+fn find_steps(sectors: &[Sector], tied: bool) -> Option<(Vec<f64>, f64)> {
     let flat = level_cost(sectors, tied, &vec![0; sectors.len()], 0.0).0;
     let mut best: Option<(f64, Vec<usize>)> = None;
     for n in 0..SIZES {
@@ -143,7 +233,8 @@ fn find_steps(sectors: &[Sector], tied: bool) -> Option<Vec<f64>> {
             times_s.extend(std::iter::repeat_n(time_s, counts[n] - counts[n - 1]));
         }
     }
-    Some(times_s)
+    let (_, _, size_rad) = level_cost_with_size(sectors, tied, &counts);
+    Some((times_s, size_rad))
 }
 
 fn steps_in(sectors: &[Sector], tied: bool, counts: &[usize]) -> usize {
@@ -272,51 +363,133 @@ fn level_cost_with_size(sectors: &[Sector], tied: bool, counts: &[usize]) -> (f6
     (cost, levels, size_rad)
 }
 
-/// The strongest tone in what differs between revolutions of a condition.
-fn find_tone(grid: &Grid, runs: &[ReducedRun], noise: &Noise, trace: &[f64]) -> Option<Pattern> {
-    let start_s = runs.iter().filter_map(|r| r.points.first()).map(|p| p.time_s).fold(f64::INFINITY, f64::min);
-    let end_s = runs.iter().filter_map(|r| r.points.last()).map(|p| p.time_s).fold(f64::NEG_INFINITY, f64::max);
-    let duration_s = end_s - start_s;
-    if duration_s <= 0.0 || grid.revolutions.len() < 2 {
+/// A tone in time.
+#[derive(Clone, Copy, Debug)]
+pub struct Tone {
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Amplitude, rad.
+    pub amplitude_rad: f64,
+}
+
+/// Finds tones in what differs between revolutions of a condition, and takes them off the points.
+pub fn take_off_tones(rig: &Rig, runs: &mut [ReducedRun]) -> Vec<Tone> {
+    let mut tones = Vec::new();
+    for _ in 0..MOST_TONES {
+        let grid = Grid::new(rig, runs);
+        let Some(frequency_hz) = strongest_tone(&grid, runs) else { break };
+        let Some(tone) = take_off_tone(runs, &grid, frequency_hz) else { break };
+        tones.push(tone);
+    }
+    tones
+}
+
+/// Values at the points freed of what goes with the angle or is a slow wave of a revolution.
+fn freed(grid: &Grid, runs: &[ReducedRun], value: &dyn Fn(&Point) -> f64) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); grid.places.len()];
+    let each = || runs.iter().zip(&grid.place_of_point).flat_map(|(run, places)| run.points.iter().zip(places));
+    for (point, place) in each() {
+        sums[*place].0 += point.samples * value(point);
+        sums[*place].1 += point.samples;
+    }
+    let means: Vec<f64> = sums.iter().map(|(sum, weight)| sum / weight.max(f64::MIN_POSITIVE)).collect();
+    let residual = incoherent(grid, &means);
+    each().map(|(point, place)| value(point) - means[*place] + residual[*place]).collect()
+}
+
+fn strongest_tone(grid: &Grid, runs: &[ReducedRun]) -> Option<f64> {
+    let duration_s = grid.plan.duration_s;
+    if grid.revolutions.len() < 2 || duration_s <= 0.0 {
         return None;
     }
-    let residual = incoherent(grid, trace);
+    let values = freed(grid, runs, &|point| point.rho_rad);
+    let points: Vec<&Point> = runs.iter().flat_map(|run| &run.points).collect();
+    let start_s = points.iter().map(|p| p.time_s).fold(f64::INFINITY, f64::min);
     let step_s = duration_s / (TONE_STEPS as f64 - 1.0);
     let mut series = vec![Complex::new(0.0, 0.0); 2 * TONE_STEPS];
     let mut power = 0.0;
-    let mut points = 0.0_f64;
-    for (run, places) in runs.iter().zip(&grid.place_of_point) {
-        for (point, place) in run.points.iter().zip(places) {
-            // Deviation of the place's mean from the model, and of the point from its place.
-            let value = point.rho_rad - grid.rho_rad[*place] + residual[*place];
-            let weight = point.samples / noise.white_rad2;
-            series[((point.time_s - start_s) / step_s) as usize].re += weight * value;
-            power += weight * weight * value * value;
-            points += 1.0;
-        }
+    for (point, value) in points.iter().zip(&values) {
+        series[((point.time_s - start_s) / step_s) as usize].re += point.samples * value;
+        power += point.samples * point.samples * value * value;
     }
     FftPlanner::new().plan_fft_forward(series.len()).process(&mut series);
-    // Below a few turns' frequency the waves of the revolutions are not white.
-    let turn_hz = grid.plan.speeds_rad_per_s.last().copied().unwrap_or(0.0) / std::f64::consts::TAU;
-    let first = ((10.0 * turn_hz) * duration_s * 2.0).ceil().max(4.0) as usize;
-    let peak = (first..TONE_STEPS).max_by(|a, b| series[*a].norm_sqr().total_cmp(&series[*b].norm_sqr()))?;
-    let nats = series[peak].norm_sqr() / power - (points / 2.0).ln();
-    let frequency_hz = peak as f64 / (2.0 * step_s * TONE_STEPS as f64);
-    (nats > TONE_NATS).then_some(Pattern::Tone { frequency_hz })
+    // Below a few turns' frequency the waves of the revolutions are not white; above half the points' rate all is mirrored.
+    let turn_hz = grid.plan.speeds_rad_per_s.last().copied().unwrap_or(0.0) / TAU;
+    let bins_per_hz = 2.0 * duration_s;
+    let first = ((10.0 * turn_hz) * bins_per_hz).ceil().max(2.0 * NEIGHBOURS as f64) as usize;
+    let mut gaps_s: Vec<f64> = points.windows(2).map(|w| w[1].time_s - w[0].time_s).collect();
+    gaps_s.sort_by(f64::total_cmp);
+    let gap_s = gaps_s.get(gaps_s.len() / 2).copied()?;
+    let last = ((0.45 / gap_s * bins_per_hz) as usize).min(TONE_STEPS - 2 * NEIGHBOURS);
+    let size: Vec<f64> = series[..TONE_STEPS].iter().map(|x| x.norm_sqr() / power).collect();
+    let peak = (first..last).max_by(|a, b| size[*a].total_cmp(&size[*b]))?;
+    // A tone is a line: it stands out of its neighbours too, which the broad spectrum of a step or a knock does not.
+    let about = size[peak - NEIGHBOURS..peak - 4].iter().chain(&size[peak + 5..peak + NEIGHBOURS]);
+    let level = about.sum::<f64>() / (2 * NEIGHBOURS - 9) as f64;
+    let nats = size[peak] / level.max(1.0) - (points.len() as f64).ln();
+    (nats > TONE_NATS).then_some(peak as f64 / bins_per_hz)
 }
 
-/// Residual of every place less its cell's mean over the revolutions and the revolution's own waves.
-fn incoherent(grid: &Grid, trace: &[f64]) -> Vec<f64> {
+/// Refines the frequency, fits the tone and subtracts it; `None` where it is too small to matter.
+fn take_off_tone(runs: &mut [ReducedRun], grid: &Grid, frequency_hz: f64) -> Option<Tone> {
+    let values = freed(grid, runs, &|point| point.rho_rad);
+    let points: Vec<Point> = runs.iter().flat_map(|run| &run.points).copied().collect();
+    let start_s = points.first()?.time_s;
+    let explained = |frequency_hz: f64| {
+        let (mut of_sin, mut of_cos) = (0.0, 0.0);
+        for (point, value) in points.iter().zip(&values) {
+            let (sin, cos) = (TAU * frequency_hz * (point.time_s - start_s)).sin_cos();
+            of_sin += point.samples * value * sin;
+            of_cos += point.samples * value * cos;
+        }
+        of_sin * of_sin + of_cos * of_cos
+    };
+    let mut centre_hz = frequency_hz;
+    let mut width_hz = 0.5 / grid.plan.duration_s;
+    for _ in 0..7 {
+        centre_hz = [-1.0, -0.5, 0.0, 0.5, 1.0]
+            .into_iter()
+            .map(|part| (centre_hz + part * width_hz, explained(centre_hz + part * width_hz)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?
+            .0;
+        width_hz *= 0.5;
+    }
+    // The tone's own waves lose to the angle what the residual lost: both are freed alike before the fit.
+    let phase = |point: &Point| TAU * centre_hz * (point.time_s - start_s);
+    let sines = freed(grid, runs, &|point| phase(point).sin());
+    let cosines = freed(grid, runs, &|point| phase(point).cos());
+    let mut normal = nalgebra::Matrix2::zeros();
+    let mut right = nalgebra::Vector2::zeros();
+    let mut square = 0.0;
+    for ((point, value), (sin, cos)) in points.iter().zip(&values).zip(sines.iter().zip(&cosines)) {
+        let x = nalgebra::Vector2::new(*sin, *cos);
+        normal += point.samples * x * x.transpose();
+        right += point.samples * *value * x;
+        square += point.samples * value * value;
+    }
+    let beta = normal.try_inverse()? * right;
+    if right.dot(&beta) < LEAST_TONE_SHARE * square {
+        return None;
+    }
+    for point in runs.iter_mut().flat_map(|run| &mut run.points) {
+        let (sin, cos) = phase(point).sin_cos();
+        point.rho_rad -= beta[0] * sin + beta[1] * cos;
+    }
+    Some(Tone { frequency_hz: centre_hz, amplitude_rad: beta.norm() })
+}
+
+/// Values of every place less their cell's mean over the revolutions and the revolution's own waves.
+fn incoherent(grid: &Grid, values: &[f64]) -> Vec<f64> {
     let mut means = vec![(0.0, 0.0); grid.cells.len()];
     for (place, cell) in grid.cell_of.iter().enumerate() {
-        means[*cell].0 += grid.weight[place] * (grid.rho_rad[place] - trace[place]);
+        means[*cell].0 += grid.weight[place] * values[place];
         means[*cell].1 += grid.weight[place];
     }
     let several = grid.cells.len() < grid.places.len();
     let mut rest: Vec<f64> = (0..grid.places.len())
         .map(|place| {
             let (sum, weight) = means[grid.cell_of[place]];
-            grid.rho_rad[place] - trace[place] - if several { sum / weight } else { 0.0 }
+            values[place] - if several { sum / weight } else { 0.0 }
         })
         .collect();
     for revolution in &grid.revolutions {
@@ -324,7 +497,10 @@ fn incoherent(grid: &Grid, trace: &[f64]) -> Vec<f64> {
         let mut normal = nalgebra::DMatrix::zeros(n, n);
         let mut right = nalgebra::DVector::zeros(n);
         for place in revolution.places.clone() {
-            let z = nalgebra::DVector::from_column_slice(&waves(grid.places[place].theta1_rad, grid.part_of_cell[grid.cell_of[place]]));
+            let z = nalgebra::DVector::from_column_slice(&waves(
+                grid.places[place].theta1_rad,
+                grid.part_of_cell[grid.cell_of[place]],
+            ));
             normal.ger(grid.weight[place], &z, &z, 1.0);
             right.axpy(grid.weight[place] * rest[place], &z, 1.0);
         }

@@ -147,7 +147,8 @@ pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -
 pub(super) fn at_scales(pool: &Pool, whitened: &Whitened, fit: &Fit) -> f64 {
     let columns: Vec<usize> = (1..=fit.columns.len()).collect();
     let (g, b) = select(&whitened.gram, &columns);
-    let evidence = solve(&g, &b, &prior(&pool.blocks, &fit.set, &fit.scales_rad)).map_or(f64::NEG_INFINITY, |s| s.log_evidence);
+    let evidence =
+        solve(&g, &b, &prior(&pool.blocks, &fit.set, &fit.scales_rad)).map_or(f64::NEG_INFINITY, |s| s.log_evidence);
     evidence - 0.5 * whitened.log_det - 0.5 * whitened.gram[(RESIDUAL, RESIDUAL)]
 }
 
@@ -169,7 +170,8 @@ fn sign_evidence(mean: f64, variance: f64) -> f64 {
 fn normal_cdf(z: f64) -> f64 {
     let x = z.abs() / std::f64::consts::SQRT_2;
     let t = 1.0 / (1.0 + 0.327_591_1 * x);
-    let poly = t * (0.254_829_592 + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
+    let poly =
+        t * (0.254_829_592 + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
     let upper = 0.5 * poly * (-x * x).exp();
     (if z > 0.0 { 1.0 - upper } else { upper }).max(1e-300)
 }

@@ -76,9 +76,7 @@ impl Grid {
     /// Bins the runs' points.
     #[must_use]
     pub fn new(rig: &Rig, runs: &[ReducedRun]) -> Self {
-        let way_of = |run: &ReducedRun, point: &Point| {
-            (point.theta1_rad - run.points[0].theta1_rad).abs() / TAU
-        };
+        let way_of = |run: &ReducedRun, point: &Point| (point.theta1_rad - run.points[0].theta1_rad).abs() / TAU;
         let turns: Vec<usize> = runs
             .iter()
             .map(|run| run.points.last().map_or(0, |last| (way_of(run, last) - 1e-3).max(0.0) as usize + 1))
@@ -183,7 +181,7 @@ impl Grid {
         let mut cell_of_bin = vec![usize::MAX; bins];
         for revolution in 0..revolutions {
             let first = self.places.len();
-            for bin in 0..bins {
+            for (bin, cell) in cell_of_bin.iter_mut().enumerate() {
                 let key = revolution * bins + bin;
                 let sum = sums[key];
                 if sum.weight == 0.0 {
@@ -202,14 +200,14 @@ impl Grid {
                     signed_rev: books[key].signed_rev.map(|x| x / w),
                     way_rev: books[key].way_rev.map(|x| x / w),
                 };
-                if !steady || cell_of_bin[bin] == usize::MAX {
-                    cell_of_bin[bin] = self.cells.len();
+                if !steady || *cell == usize::MAX {
+                    *cell = self.cells.len();
                     self.cells.push(station);
                     self.part_of_cell.push((bin as f64 + 0.5) / bins as f64);
                 }
                 place_of_key[key] = self.places.len();
                 self.places.push(station);
-                self.cell_of.push(cell_of_bin[bin]);
+                self.cell_of.push(*cell);
                 self.rho_rad.push(sum.rho / w);
                 self.weight.push(w);
                 self.within_rad2 += (sum.rho2 - sum.rho * sum.rho / w).max(0.0);
@@ -250,9 +248,9 @@ fn levels(values: impl Iterator<Item = f64>) -> Vec<f64> {
     }
     // More levels than a ledger has: the nearest neighbours become one.
     while found.len() > crate::effect::LEDGER_LOADS {
-        let Some(at) = (1..found.len()).min_by(|a, b| {
-            (found[*a].0 - found[*a - 1].0).total_cmp(&(found[*b].0 - found[*b - 1].0))
-        }) else {
+        let Some(at) =
+            (1..found.len()).min_by(|a, b| (found[*a].0 - found[*a - 1].0).total_cmp(&(found[*b].0 - found[*b - 1].0)))
+        else {
             break;
         };
         let (value, count) = found.remove(at);
@@ -263,9 +261,7 @@ fn levels(values: impl Iterator<Item = f64>) -> Vec<f64> {
 }
 
 fn nearest(levels: &[f64], value: f64) -> usize {
-    (0..levels.len())
-        .min_by(|a, b| (levels[*a] - value).abs().total_cmp(&(levels[*b] - value).abs()))
-        .unwrap_or(0)
+    (0..levels.len()).min_by(|a, b| (levels[*a] - value).abs().total_cmp(&(levels[*b] - value).abs())).unwrap_or(0)
 }
 
 /// Whether a run keeps its load within 2 % of its largest.

@@ -39,7 +39,8 @@ pub fn search_lines(parts: &[Recording<'_>], nominal: &Nominal, known: [Option<f
         let mut rho = Vec::with_capacity(seen.len());
         for n in &seen {
             let theta1_rad = columns.theta1_rad[*n];
-            let te_rad = columns.theta2_rad[*n] - pair.theta2(theta1_rad) - nominal.te_rad(theta1_rad, direction, load_nm);
+            let te_rad =
+                columns.theta2_rad[*n] - pair.theta2(theta1_rad) - nominal.te_rad(theta1_rad, direction, load_nm);
             rho.push(te_rad);
             sums.push(sums[rho.len() - 1] + te_rad);
         }

@@ -13,11 +13,14 @@ const BLOCK_SAMPLES: usize = 24;
 /// Fewest line periods in a block.
 const BLOCK_LINES: f64 = 4.0;
 
+/// Waves, driver angle and residual of a sample.
+type BlockSample = ([f64; WAVES], f64, f64);
+
 /// Sums over blocks.
 #[derive(Clone, Debug)]
 pub struct LinePhase {
     lines: [Option<f64>; 2],
-    block: Vec<([f64; WAVES], f64, f64)>,
+    block: Vec<BlockSample>,
     origin: [f64; 2],
     /// Σ x xᵀ.
     pub(super) gram: SMatrix<f64, WAVES, WAVES>,
@@ -77,11 +80,15 @@ impl LinePhase {
     pub(super) fn flush(&mut self) {
         let n = self.block.len() as f64;
         if self.block.len() >= BLOCK_SAMPLES {
-            let mean = |value: &dyn Fn(&([f64; WAVES], f64, f64)) -> f64| self.block.iter().map(value).sum::<f64>() / n;
+            let mean = |value: &dyn Fn(&BlockSample) -> f64| self.block.iter().map(value).sum::<f64>() / n;
             let (theta, rho) = (mean(&|s| s.1), mean(&|s| s.2));
             let spread: f64 = self.block.iter().map(|s| (s.1 - theta).powi(2)).sum();
-            let slope = |value: &dyn Fn(&([f64; WAVES], f64, f64)) -> f64| {
-                if spread > 0.0 { self.block.iter().map(|s| (s.1 - theta) * value(s)).sum::<f64>() / spread } else { 0.0 }
+            let slope = |value: &dyn Fn(&BlockSample) -> f64| {
+                if spread > 0.0 {
+                    self.block.iter().map(|s| (s.1 - theta) * value(s)).sum::<f64>() / spread
+                } else {
+                    0.0
+                }
             };
             let rho_slope = slope(&|s| s.2);
             let means: [f64; WAVES] = std::array::from_fn(|k| mean(&|s| s.0[k]));
@@ -97,6 +104,16 @@ impl LinePhase {
             self.freedom += n - 2.0;
         }
         self.block.clear();
+    }
+
+    /// Takes an error that was found off the sums.
+    pub(super) fn take_off(&mut self, error: &LineError) {
+        let first = 4 * error.encoder + 2 * (error.order - 1);
+        for (n, amplitude) in error.amplitudes.iter().enumerate() {
+            let column = self.gram.column(first + n).into_owned();
+            self.products -= column * *amplitude;
+        }
+        self.squares -= error.explained_rad2;
     }
 
     /// Adds another run's sums.

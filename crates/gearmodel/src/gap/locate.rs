@@ -47,8 +47,7 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
     let loads: Vec<_> = grid.plan.loads_nm.iter().map(|x| json!(x)).collect();
     let speeds: Vec<_> = grid.plan.speeds_rad_per_s.iter().map(|x| json!(x * 60.0 / TAU)).collect();
     let revolutions = (grid.plan.revolutions.ceil() as usize).clamp(1, 400);
-    let times: Vec<_> =
-        (0..TIMES).map(|n| json!((n as f64 + 0.5) * grid.plan.duration_s / TIMES as f64)).collect();
+    let times: Vec<_> = (0..TIMES).map(|n| json!((n as f64 + 0.5) * grid.plan.duration_s / TIMES as f64)).collect();
     let time = |at: &Station| ((at.time_s / grid.plan.duration_s.max(1e-9)) * TIMES as f64) as usize;
     let floor_of_order = |n: usize| {
         let runs = grid.revolutions.len().max(1) as f64;
@@ -89,10 +88,7 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
         direction: by(&|at| Some(usize::from(at.sense < 0.0)), &[json!("ccw"), json!("cw")]),
         load: by(&|at| nearest(&grid.plan.loads_nm, at.load_nm), &loads),
         speed: by(&|at| nearest(&grid.plan.speeds_rad_per_s, at.speed_rad_per_s.abs()), &speeds),
-        revolution: by(
-            &|at| Some(at.way_rev as usize),
-            &(0..revolutions).map(|n| json!(n)).collect::<Vec<_>>(),
-        ),
+        revolution: by(&|at| Some(at.way_rev as usize), &(0..revolutions).map(|n| json!(n)).collect::<Vec<_>>()),
         time: by(&|at| Some(time(at)), &times),
     }
 }
@@ -162,9 +158,8 @@ fn signature(inputs: &Inputs<'_>) -> Signature {
     }
     for line in *lines {
         let size = line.explained_rad2 / grid.samples;
-        let effect = LIBRARY
-            .iter()
-            .find(|e| e.name() == ["encoder1_interpolation", "encoder2_interpolation"][line.encoder]);
+        let effect =
+            LIBRARY.iter().find(|e| e.name() == ["encoder1_interpolation", "encoder2_interpolation"][line.encoder]);
         if let Some(effect) = effect
             && largest.as_ref().is_none_or(|(s, _)| size > *s)
         {

@@ -81,8 +81,19 @@ pub(super) fn experiments(grid: &Grid, open: &Open, unknown: &Unknown, warnings:
             hits >= 2
         };
         if let Some(remedy) = REMEDIES.iter().find(covered) {
-            let rows = vec![PlanRow { direction: seen.to_owned(), load_nm: plan.loads_nm.first().copied().unwrap_or(0.0), speed_rpm: rpm, revolutions: 4 }];
-            found.push(experiment(remedy.action.to_owned(), members.clone(), expected(members.len(), 2), rows, HANDS_MIN));
+            let rows = vec![PlanRow {
+                direction: seen.to_owned(),
+                load_nm: plan.loads_nm.first().copied().unwrap_or(0.0),
+                speed_rpm: rpm,
+                revolutions: 4,
+            }];
+            found.push(experiment(
+                remedy.action.to_owned(),
+                members.clone(),
+                expected(members.len(), 2),
+                rows,
+                HANDS_MIN,
+            ));
         }
     }
     let runs = |directions: &[&str], loads: &[f64], speeds: &[f64], revolutions: u32| -> Vec<PlanRow> {
@@ -90,7 +101,12 @@ pub(super) fn experiments(grid: &Grid, open: &Open, unknown: &Unknown, warnings:
         for load in loads {
             for speed in speeds {
                 for direction in directions {
-                    rows.push(PlanRow { direction: (*direction).to_owned(), load_nm: *load, speed_rpm: *speed, revolutions });
+                    rows.push(PlanRow {
+                        direction: (*direction).to_owned(),
+                        load_nm: *load,
+                        speed_rpm: *speed,
+                        revolutions,
+                    });
                 }
             }
         }
@@ -108,7 +124,13 @@ pub(super) fn experiments(grid: &Grid, open: &Open, unknown: &Unknown, warnings:
     }
     if plan.speeds_rad_per_s.len() < 2 {
         let rows = runs(&["ccw", "cw"], &[load_nm], &[0.5 * rpm, 2.0 * rpm], 4);
-        found.push(experiment("record half and twice the speed in both senses".to_owned(), unsure.clone(), 0.9, rows, 0.0));
+        found.push(experiment(
+            "record half and twice the speed in both senses".to_owned(),
+            unsure.clone(),
+            0.9,
+            rows,
+            0.0,
+        ));
     }
     if unknown.probability > 0.3 {
         let rows = runs(&["ccw", "cw"], &[load_nm], &[rpm, 2.0 * rpm], 12);
@@ -134,10 +156,16 @@ fn expected(members: usize, told_apart: usize) -> f64 {
     if members <= told_apart { 0.99 } else { 0.99 / (members - 1) as f64 }
 }
 
-fn experiment(action: String, separates: Vec<String>, expected_probability: f64, plan: Vec<PlanRow>, hands_min: f64) -> Experiment {
+fn experiment(
+    action: String,
+    separates: Vec<String>,
+    expected_probability: f64,
+    plan: Vec<PlanRow>,
+    hands_min: f64,
+) -> Experiment {
     // A run takes its revolutions, one to get there and half a minute to settle.
-    let minutes = hands_min
-        + plan.iter().map(|row| f64::from(row.revolutions + 1) / row.speed_rpm.max(0.1) + 0.5).sum::<f64>();
+    let minutes =
+        hands_min + plan.iter().map(|row| f64::from(row.revolutions + 1) / row.speed_rpm.max(0.1) + 0.5).sum::<f64>();
     let mut toml = String::new();
     for row in &plan {
         // Writing to a String cannot fail.

@@ -1,7 +1,7 @@
 //! Repeatability: what differs between revolutions and runs of one condition.
 //!
 //! Residual of a place = model + run's waves + revolution's waves + white noise. The waves are the low orders of the driver's
-//! turn, 0 … [`ORDERS`], and what goes from one level to the next within a revolution: a ramp, alone and on order 1. Wave n has
+//! turn, 0 … 8, and what goes from one level to the next within a revolution: a ramp, alone and on order 1. Wave n has
 //! variance λ_n between revolutions and κ λ_n between runs (κ of the level its own), white noise σ²/samples. With
 //! Z the waves at the places, V = σ²W⁻¹ + Z Λ Zᵀ (+ the same across a run), inverted by Woodbury's identity on the sums
 //! of the pool. Samples are not independent: treated as such, a null campaign shows false effects more often than not.
@@ -17,7 +17,7 @@ pub(super) const ORDERS: usize = 8;
 const RAMPS: usize = 3;
 /// Waves: the constant, cosine and sine of every order, and the ramps.
 pub(super) const WAVES: usize = 2 * ORDERS + 1 + RAMPS;
-/// Kinds of waves: order 0 … [`ORDERS`], the ramp, the ramp on order 1.
+/// Kinds of waves: order 0 … 8, the ramp, the ramp on order 1.
 pub(super) const KINDS: usize = ORDERS + 3;
 /// Least scatter taken of an order, rad: a hundredth of the finest rig's.
 const LEAST_SCATTER_RAD: f64 = 3e-8;
@@ -125,8 +125,9 @@ impl Noise {
         let mut squares: Vec<Vec<f64>> = vec![Vec::new(); ORDERS + 1];
         let of_white = white_rad2 / weight.max(1.0);
         for run in 0..grid.directions.len() {
-            let numbers: Vec<usize> =
-                (0..grid.revolutions.len()).filter(|n| grid.revolutions[*n].run == run && fitted[*n].is_some()).collect();
+            let numbers: Vec<usize> = (0..grid.revolutions.len())
+                .filter(|n| grid.revolutions[*n].run == run && fitted[*n].is_some())
+                .collect();
             let differences: Vec<_> = numbers
                 .windows(2)
                 .filter_map(|pair| Some(fitted[pair[1]].as_ref()? - fitted[pair[0]].as_ref()?))

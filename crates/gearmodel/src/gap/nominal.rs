@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use crate::Direction;
 use crate::contact::ContactModel;
 use crate::effect::Rig;
 use crate::increment::common_normal;
-use crate::Direction;
 
 /// Angles a turn at which exact contact is tabulated against the first order.
 const STEPS: usize = 1440;
@@ -26,9 +26,8 @@ impl Nominal {
         let errors = rig.model().errors;
         let closes = (pair.closure() - pair.closure().round()).abs() < 1e-12;
         let displaced = errors.e1_mm != 0.0 || errors.e2_mm != 0.0;
-        let exact = (closes && displaced && pair.has_teeth())
-            .then(|| ContactModel::new(pair.clone(), &errors).ok())
-            .flatten();
+        let exact =
+            (closes && displaced && pair.has_teeth()).then(|| ContactModel::new(pair.clone(), &errors).ok()).flatten();
         let correction_rad = Direction::BOTH.map(|direction| {
             let Some(exact) = &exact else { return Vec::new() };
             (0..STEPS)

@@ -159,8 +159,7 @@ impl Pool {
         let old = self.blocks[first].columns.start;
         let kept = last.contains(&keep).then(|| self.blocks[keep].clone());
         self.blocks.truncate(first);
-        let columns: Vec<usize> =
-            (0..old).chain(kept.iter().flat_map(|block| block.columns.clone())).collect();
+        let columns: Vec<usize> = (0..old).chain(kept.iter().flat_map(|block| block.columns.clone())).collect();
         let mut values: Vec<Option<Values>> = std::mem::take(&mut self.values).into_iter().map(Some).collect();
         self.values = columns.iter().filter_map(|c| values[*c].take()).collect();
         self.products = DMatrix::from_fn(columns.len(), columns.len(), |m, n| self.products[(columns[m], columns[n])]);
@@ -178,8 +177,7 @@ impl Pool {
             Cause::Effect { effect, shape, .. } => (effect.width(rig, shape), effect.evolves()),
             Cause::Unknown(pattern) => (pattern.width(), pattern.evolves()),
         };
-        let (stations, weights) =
-            if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.cell_weight) };
+        let (stations, weights) = if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.cell_weight) };
         let mut raw = vec![0.0; stations.len() * width];
         for (row, station) in raw.chunks_exact_mut(width).zip(stations) {
             match cause {
@@ -218,8 +216,7 @@ impl Pool {
         }
         let eigen = SymmetricEigen::new(covariance);
         let largest = eigen.eigenvalues.max();
-        let kept: Vec<usize> =
-            (0..width).filter(|n| eigen.eigenvalues[*n] > UNSEEN * UNSEEN * largest).collect();
+        let kept: Vec<usize> = (0..width).filter(|n| eigen.eigenvalues[*n] > UNSEEN * UNSEEN * largest).collect();
         let mut transform = DMatrix::zeros(width, kept.len());
         for (to, from) in kept.iter().enumerate() {
             let mut direction = eigen.eigenvectors.column(*from) / eigen.eigenvalues[*from].sqrt();
@@ -279,7 +276,8 @@ impl Pool {
         let panels: Vec<(Vec<usize>, DMatrix<f64>)> = fresh
             .par_chunks(PANEL)
             .map(|panel| {
-                let left = DMatrix::from_fn(panel.len(), self.cell_weight.len(), |n, cell| weighted[panel[n] - old][cell]);
+                let left =
+                    DMatrix::from_fn(panel.len(), self.cell_weight.len(), |n, cell| weighted[panel[n] - old][cell]);
                 (panel.to_vec(), left * &matrix)
             })
             .collect();

@@ -1,6 +1,6 @@
 //! From the models seen to the fields of the diagnosis.
 
-use serde_json::{Map, Value as Json, json};
+use serde_json::{Value as Json, json};
 
 use super::*;
 use crate::effect::{Parameter, Value};
@@ -9,6 +9,8 @@ use crate::gap::shrink::{HeldOut, Selection};
 
 /// Flattens what the noise model's own error makes too sure; calibrated on simulated campaigns.
 const SHARPNESS: f64 = 0.85;
+/// Probability of a tone that was found over all frequencies.
+const TONE_PROBABILITY: f64 = 0.99;
 /// Prior odds of a sub-divisional error.
 const LINE_ODDS: f64 = 0.04;
 /// A remainder under this part of what was found is the found effects' own inexactness.
@@ -45,8 +47,9 @@ impl Engine<'_> {
         let floor_rad2 = held_out.floor_rad2(&self.grid, &self.noise);
         let before = held_out.errors(&Selection::default());
         let after = held_out.errors(&self.selection(best));
-        let found = !best.fit.set.is_empty() || !lines.is_empty();
-        let explained_rad2 = lines.iter().map(|l| l.explained_rad2).sum::<f64>() / self.grid.samples;
+        let found = !best.fit.set.is_empty() || !lines.is_empty() || !self.tones.is_empty();
+        let explained_rad2 = lines.iter().map(|l| l.explained_rad2).sum::<f64>() / self.grid.samples
+            + self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum::<f64>();
         // What the place's own samples scatter, less what the lines explain of it.
         let within_rad2 = self.grid.within_rad2 / self.grid.samples;
         let mut gap = shrink::gap(&before, &after, floor_rad2, within_rad2, explained_rad2, found);
@@ -66,12 +69,12 @@ impl Engine<'_> {
                 _ => None,
             };
         }
-        let total_rad = findings
+        let total_rad2 = findings
             .iter()
             .filter(|f| f.probability > NAMED && f.block.is_some_and(|b| best.fit.set.contains(&b)))
             .map(|f| f.rms_rad * f.rms_rad)
-            .sum::<f64>()
-            .sqrt();
+            .sum::<f64>();
+        let total_rad = (total_rad2 + explained_rad2).sqrt();
         for finding in &mut findings {
             if finding.block.is_some() && finding.rms_rad < INEXACT * total_rad {
                 finding.probability = finding.probability.min(INEXACT_PROBABILITY);
@@ -139,7 +142,9 @@ impl Engine<'_> {
             let own: Vec<usize> = (0..self.pool.blocks.len())
                 .filter(|b| matches!(&self.pool.blocks[*b].cause, Cause::Effect { number: n, .. } if *n == number))
                 .collect();
-            if let Some(encoder) = ["encoder1_interpolation", "encoder2_interpolation"].iter().position(|n| *n == effect.name()) {
+            if let Some(encoder) =
+                ["encoder1_interpolation", "encoder2_interpolation"].iter().position(|n| *n == effect.name())
+            {
                 findings.push(self.line_finding(number, encoder, lines));
                 continue;
             }
@@ -170,13 +175,14 @@ impl Engine<'_> {
                 };
                 reference.map_or_else(Vec::new, |reference| {
                     let cell = std::cell::RefCell::new(&mut *search);
-                    let replaced = if in_best {
-                        Some(block)
-                    } else {
-                        best.fit.set.iter().copied().find(|b| {
-                            attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG
-                        })
-                    };
+                    let replaced =
+                        if in_best {
+                            Some(block)
+                        } else {
+                            best.fit.set.iter().copied().find(|b| {
+                                attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG
+                            })
+                        };
                     twins(
                         &self.pool,
                         &self.whitened,
@@ -194,8 +200,10 @@ impl Engine<'_> {
                 Some(best.clone())
             } else {
                 let twin = best.fit.set.iter().copied().find(|b| match &self.pool.blocks[*b].cause {
-                    Cause::Effect { number: n, .. } => *n == number
-                        || attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG,
+                    Cause::Effect { number: n, .. } => {
+                        *n == number
+                            || attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG
+                    }
                     Cause::Unknown(_) => false,
                 });
                 score_with(search, twin, block)
@@ -246,9 +254,7 @@ impl Engine<'_> {
                 beta: l.amplitudes.to_vec(),
                 covariance: nalgebra::DMatrix::from_column_slice(2, 2, l.covariance.as_slice()),
             }),
-            shape: strongest
-                .and_then(|l| Some(vec![l.order as f64, self.rig.lines[encoder]?]))
-                .unwrap_or_default(),
+            shape: strongest.and_then(|l| Some(vec![l.order as f64, self.rig.lines[encoder]?])).unwrap_or_default(),
             rms_rad,
             shrink: None,
             twins: Vec::new(),
@@ -261,9 +267,13 @@ impl Engine<'_> {
             .estimate
             .as_ref()
             .map(|estimate| {
-                effect.parameters(self.rig, &finding.shape, estimate).iter().map(|p| (p.name.to_owned(), parameter(p))).collect()
+                effect
+                    .parameters(self.rig, &finding.shape, estimate)
+                    .iter()
+                    .map(|p| (p.name.to_owned(), parameter(p)))
+                    .collect()
             })
-            .unwrap_or_else(Map::new);
+            .unwrap_or_default();
         EffectFinding {
             name: effect.name().to_owned(),
             probability: finding.probability,
@@ -314,9 +324,9 @@ impl Engine<'_> {
                 probability
             };
             let in_best = finding.block.is_none()
-                || best.fit.set.iter().any(|b| {
-                    matches!(&self.pool.blocks[*b].cause, Cause::Effect { number, .. } if members.contains(number))
-                });
+                || best.fit.set.iter().any(
+                    |b| matches!(&self.pool.blocks[*b].cause, Cause::Effect { number, .. } if members.contains(number)),
+                );
             if members.len() > 1 {
                 if probability < 0.02 {
                     continue;
@@ -353,14 +363,19 @@ impl Engine<'_> {
                 Cause::Effect { .. } => known += size,
             }
         }
+        square += self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum::<f64>();
         let rms_rad = square.sqrt();
+        if let Some(tone) = self.tones.first() {
+            let pattern = Pattern::Tone { frequency_hz: tone.frequency_hz };
+            let location = Some(UnknownLocation { description: pattern.describe(), signature: pattern.signature() });
+            return Unknown { probability: TONE_PROBABILITY, rms_rad, location };
+        }
         // Effects are linearised and their shapes lie on grids: a small part of them may stay behind.
         let inexact = square > 0.0 && rms_rad < INEXACT * known.sqrt();
         let probability = if inexact { attribution.unknown.min(INEXACT_PROBABILITY) } else { attribution.unknown };
-        let location = strongest.filter(|_| probability > 0.1).map(|(_, pattern)| UnknownLocation {
-            description: pattern.describe(),
-            signature: pattern.signature(),
-        });
+        let location = strongest
+            .filter(|_| probability > 0.1)
+            .map(|(_, pattern)| UnknownLocation { description: pattern.describe(), signature: pattern.signature() });
         Unknown { probability: probability.min(1.0), rms_rad, location }
     }
 
@@ -376,21 +391,15 @@ impl Engine<'_> {
         let weight = products[(1, 1)];
         let centred = |a: usize, b: usize| (products[(a, b)] - products[(a, 1)] * products[(b, 1)] / weight) / weight;
         let covariance = |a: std::ops::Range<usize>, beta: &dyn Fn(usize) -> f64| -> f64 {
-            a.map(|m| {
-                (1..columns.len()).map(|n| beta(m) * beta(n) * centred(columns[m], columns[n])).sum::<f64>()
-            })
-            .sum()
+            a.map(|m| (1..columns.len()).map(|n| beta(m) * beta(n) * centred(columns[m], columns[n])).sum::<f64>())
+                .sum()
         };
         let mean = |n: usize| best.fit.mean[n];
         let mut explained = 0.0;
         for (n, b) in best.fit.set.iter().enumerate() {
             let place = best.fit.place(&self.pool, n);
             let share = covariance(place.clone(), &mean) / reducible;
-            let deviation = place
-                .clone()
-                .map(|m| best.fit.covariance[(m, m)])
-                .sum::<f64>()
-                .sqrt()
+            let deviation = place.clone().map(|m| best.fit.covariance[(m, m)]).sum::<f64>().sqrt()
                 * 2.0
                 * (share.abs() / reducible).sqrt();
             explained += share;
@@ -398,7 +407,11 @@ impl Engine<'_> {
                 Cause::Effect { effect, .. } => effect.name().to_owned(),
                 Cause::Unknown(pattern) => format!("unknown: {}", pattern.describe()),
             };
-            rows.push(BudgetRow { effect, share, interval: Some([share - 1.645 * deviation, share + 1.645 * deviation]) });
+            rows.push(BudgetRow {
+                effect,
+                share,
+                interval: Some([share - 1.645 * deviation, share + 1.645 * deviation]),
+            });
         }
         for line in lines {
             let share = line.explained_rad2 / self.grid.samples / reducible;
@@ -423,10 +436,13 @@ impl Engine<'_> {
                     Verdict::Name(name) => vec![name],
                     Verdict::Group { members, .. } => members.iter().map(String::as_str).collect(),
                 };
-                findings
-                    .iter()
-                    .find(|f| names.contains(&LIBRARY[f.number].name()))
-                    .and_then(|f| Some(FoundEffect { effect: LIBRARY[f.number], shape: f.shape.clone(), estimate: f.estimate.clone()? }))
+                findings.iter().find(|f| names.contains(&LIBRARY[f.number].name())).and_then(|f| {
+                    Some(FoundEffect {
+                        effect: LIBRARY[f.number],
+                        shape: f.shape.clone(),
+                        estimate: f.estimate.clone()?,
+                    })
+                })
             })
             .collect();
         Found { rig: Some(self.rig.clone()), effects }
@@ -455,10 +471,7 @@ impl Engine<'_> {
 
     /// Sums of two named effects that a third could feign, and the other way round.
     fn mimics(&self, findings: &[Finding], verdict: &[Verdict]) -> Vec<String> {
-        let named: Vec<&Finding> = findings
-            .iter()
-            .filter(|f| f.block.is_some() && f.probability > 0.3)
-            .collect();
+        let named: Vec<&Finding> = findings.iter().filter(|f| f.block.is_some() && f.probability > 0.3).collect();
         let mut warnings = Vec::new();
         if verdict.is_empty() {
             return warnings;
@@ -493,8 +506,7 @@ impl Engine<'_> {
         let g = &self.whitened.gram;
         let zero = g[(1, 1)];
         let entry = |m: usize, n: usize| g[(m, n)] - g[(m, 1)] * g[(n, 1)] / zero;
-        let sum: Vec<usize> =
-            self.pool.blocks[a].columns.clone().chain(self.pool.blocks[b].columns.clone()).collect();
+        let sum: Vec<usize> = self.pool.blocks[a].columns.clone().chain(self.pool.blocks[b].columns.clone()).collect();
         let own: Vec<usize> = self.pool.blocks[target].columns.clone().collect();
         let part = |rows: &[usize], columns: &[usize]| {
             nalgebra::DMatrix::from_fn(rows.len(), columns.len(), |m, n| entry(rows[m], columns[n]))
@@ -504,9 +516,7 @@ impl Engine<'_> {
         for n in 0..sum.len() {
             gram[(n, n)] += ridge;
         }
-        let (Some(ls), Some(lo)) =
-            (nalgebra::Cholesky::new(gram), nalgebra::Cholesky::new(part(&own, &own)))
-        else {
+        let (Some(ls), Some(lo)) = (nalgebra::Cholesky::new(gram), nalgebra::Cholesky::new(part(&own, &own))) else {
             return 90.0;
         };
         let Some(left) = ls.l().solve_lower_triangular(&part(&sum, &own)) else { return 90.0 };

@@ -30,6 +30,9 @@ pub struct Model {
     pub score: f64,
 }
 
+/// Blocks with the score that their addition is expected to reach, best first.
+type Ranking = Vec<(usize, f64)>;
+
 /// Everything seen on the way.
 pub struct Search<'a> {
     pool: &'a Pool,
@@ -38,7 +41,7 @@ pub struct Search<'a> {
     offset: f64,
     priors: Vec<f64>,
     seen: HashMap<Vec<usize>, Option<Model>>,
-    scanned: HashMap<(Vec<usize>, bool), Vec<(usize, f64)>>,
+    scanned: HashMap<(Vec<usize>, bool), Ranking>,
 }
 
 impl<'a> Search<'a> {
@@ -99,14 +102,14 @@ impl<'a> Search<'a> {
     }
 
     /// The best additions to a model: (block, score by the scan).
-    fn additions(&mut self, model: &Model, unknown: bool, count: usize) -> Vec<(usize, f64)> {
+    fn additions(&mut self, model: &Model, unknown: bool, count: usize) -> Ranking {
         let key = (model.fit.set.clone(), unknown);
         if let Some(known) = self.scanned.get(&key) {
             return known[..count.min(known.len())].to_vec();
         }
         let candidates = self.open(&model.fit.set, unknown);
         let gains = scan(self.pool, self.whitened, &model.fit, &candidates);
-        let mut ranked: Vec<(usize, f64)> =
+        let mut ranked: Ranking =
             candidates.iter().zip(gains).map(|(b, gain)| (*b, model.score + gain + self.priors[*b])).collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
         ranked.truncate(MOST_RANKED);
@@ -167,7 +170,7 @@ impl<'a> Search<'a> {
                 best = model;
             }
         }
-        let mut with_unknown = self.climb(best.fit.set.clone(), true)?;
+        let mut with_unknown = self.climb(best.fit.set, true)?;
         // And the other way round: what lies outside may be the larger part.
         if let Some((block, score)) = self.additions(&empty, true, 1).into_iter().next()
             && score > empty.score

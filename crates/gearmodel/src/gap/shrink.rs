@@ -196,11 +196,23 @@ pub fn closed(before: &Errors, after: &Errors, floor_rad2: f64) -> Option<(f64, 
 /// RMS figures of the gap; `within_rad2` is the mean square inside the places, `explained_rad2` that part of all which line
 /// errors explain.
 #[must_use]
-pub fn gap(before: &Errors, after: &Errors, floor_rad2: f64, within_rad2: f64, explained_rad2: f64, found: bool) -> Gap {
+pub fn gap(
+    before: &Errors,
+    after: &Errors,
+    floor_rad2: f64,
+    within_rad2: f64,
+    explained_rad2: f64,
+    found: bool,
+) -> Gap {
     let total = |mean: f64| (mean + within_rad2).max(0.0).sqrt();
     let closed = if found {
         let full = Errors {
-            by_revolution: before.by_revolution.iter().zip(&before.weights).map(|(b, w)| b + explained_rad2 * w).collect(),
+            by_revolution: before
+                .by_revolution
+                .iter()
+                .zip(&before.weights)
+                .map(|(b, w)| b + explained_rad2 * w)
+                .collect(),
             weights: before.weights.clone(),
         };
         closed(&full, after, floor_rad2)

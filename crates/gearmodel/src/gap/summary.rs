@@ -49,14 +49,21 @@ pub fn text(diagnosis: &Diagnosis) -> String {
             }
             Verdict::Name(name) => {
                 if let Some(effect) = diagnosis.effects.iter().find(|e| e.name == *name) {
-                    let _ = writeln!(out, "why   {name} ({})   p = {:.3}{}", effect.component, effect.probability, closes(effect));
+                    let _ = writeln!(
+                        out,
+                        "why   {name} ({})   p = {:.3}{}",
+                        effect.component,
+                        effect.probability,
+                        closes(effect)
+                    );
                     let _ = writeln!(out, "        {}", parameters(effect));
                 }
             }
             Verdict::Group { members, .. } => {
                 let probability =
                     diagnosis.groups.iter().find(|g| g.members == *members).map_or(0.0, |g| g.probability);
-                let shrink = diagnosis.effects.iter().find(|e| members.contains(&e.name)).map(closes).unwrap_or_default();
+                let shrink =
+                    diagnosis.effects.iter().find(|e| members.contains(&e.name)).map(closes).unwrap_or_default();
                 let _ = writeln!(
                     out,
                     "why   {}   p = {probability:.3}{shrink}   (this data cannot tell which: same trace)",
@@ -113,7 +120,8 @@ fn parameters(effect: &EffectFinding) -> String {
                 (Some(value), _) => format!("{name} = {value}{unit}"),
                 _ => match entry["value"].as_array() {
                     Some(values) => {
-                        let peak = values.iter().filter_map(serde_json::Value::as_f64).fold(0.0_f64, |m, x| m.max(x.abs()));
+                        let peak =
+                            values.iter().filter_map(serde_json::Value::as_f64).fold(0.0_f64, |m, x| m.max(x.abs()));
                         format!("{name}: {} values up to {peak:.2e}{unit}", values.len())
                     }
                     None => format!("{name} = {}", entry["value"].as_str().unwrap_or("?")),
@@ -151,9 +159,8 @@ pub fn in_words(signature: &Signature) -> String {
         Accumulates::PerRevolution => "accumulating with every revolution",
         Accumulates::PerTime => "growing with time",
     };
-    let sector = signature
-        .sector_deg
-        .map_or_else(String::new, |[from, to]| format!(", theta1 from {from:.1} to {to:.1} deg"));
+    let sector =
+        signature.sector_deg.map_or_else(String::new, |[from, to]| format!(", theta1 from {from:.1} to {to:.1} deg"));
     format!(
         "{carrier}, {parity}, {}, {}, {accumulates}{sector}",
         grows("load", signature.load_exponent),

@@ -5,6 +5,9 @@ use std::f64::consts::TAU;
 
 use crate::effect::{Accumulates, Carrier, Parity, Plan, Shaft, Signature, Station};
 
+/// Highest order of waves that do not close with the turn.
+const HIGHEST_WANDERING: f64 = 3.5;
+
 /// How a pattern scales with the condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
@@ -14,7 +17,7 @@ pub enum Weight {
     Load,
     /// With the speed over its mean.
     Speed,
-    /// With time over the campaign, −1 to 1.
+    /// With time over the campaign, 0 to 1.
     Time,
 }
 
@@ -67,17 +70,6 @@ pub enum Pattern {
         /// Time since the campaign's start, s.
         time_s: f64,
     },
-    /// Bumps along the driver's turn of a tooth's size that the others do not describe.
-    Bumps {
-        /// Number of bumps a turn.
-        count: usize,
-        /// True where the sign turns with the sense.
-        odd: bool,
-        /// Scaling.
-        weight: Weight,
-        /// Mean of what it scales with.
-        mean: f64,
-    },
 }
 
 impl Pattern {
@@ -126,15 +118,50 @@ impl Pattern {
         patterns
     }
 
+    /// Waves over the driver's angle that do not close with its turn: a grid of orders as fine as the angle covered tells apart.
+    #[must_use]
+    pub fn wandering(span_rev: f64) -> Vec<Self> {
+        let step = (0.4 / span_rev.max(1.0)).clamp(0.02, 0.2);
+        let count = (HIGHEST_WANDERING / step) as usize;
+        (1..=count)
+            .map(|n| n as f64 * step)
+            .filter(|order| (order - order.round()).abs() > 0.25 * step || *order < 0.9)
+            .map(|order| Self::Order { shaft: Shaft::Input, order, odd: false, weight: Weight::One, mean: 1.0 })
+            .collect()
+    }
+
+    /// The same wave with orders closer about its own.
+    #[must_use]
+    pub fn nearer(&self, step: f64) -> Vec<Self> {
+        match self {
+            Self::Order { shaft, order, odd, weight, mean } => [-0.5, -0.25, 0.25, 0.5]
+                .into_iter()
+                .map(|part| Self::Order {
+                    shaft: *shaft,
+                    order: order + part * step,
+                    odd: *odd,
+                    weight: *weight,
+                    mean: *mean,
+                })
+                .collect(),
+            _ => Vec::new(),
+        }
+    }
+
     /// Columns.
     #[must_use]
     pub fn width(&self) -> usize {
         match self {
             Self::Order { .. } | Self::Tone { .. } => 2,
-            Self::OneSense { order, .. } => if *order == 0 { 1 } else { 2 },
+            Self::OneSense { order, .. } => {
+                if *order == 0 {
+                    1
+                } else {
+                    2
+                }
+            }
             Self::Level { .. } | Self::Step { .. } => 1,
             Self::RunLevels { runs } => runs - 1,
-            Self::Bumps { count, .. } => *count,
         }
     }
 
@@ -156,7 +183,7 @@ impl Pattern {
                 Weight::One => 1.0,
                 Weight::Load => at.load_nm / mean,
                 Weight::Speed => at.speed_rad_per_s.abs() / mean,
-                Weight::Time => 2.0 * at.time_s / mean - 1.0,
+                Weight::Time => at.time_s / mean,
             };
             if odd { at.sense * size } else { size }
         };
@@ -189,10 +216,6 @@ impl Pattern {
                 row[1] = cos;
             }
             Self::Step { time_s } => row[0] = f64::from(u8::from(at.time_s >= *time_s)),
-            Self::Bumps { count, odd, weight, mean } => {
-                let place = (at.theta1_rad / TAU).rem_euclid(1.0) * *count as f64;
-                row[(place as usize).min(count - 1)] = scale(*weight, *mean, *odd);
-            }
         }
     }
 
@@ -221,9 +244,6 @@ impl Pattern {
             Self::RunLevels { .. } => "an offset that differs from run to run".to_owned(),
             Self::Tone { frequency_hz } => format!("a tone of {frequency_hz:.4} Hz in time"),
             Self::Step { time_s } => format!("a step at {time_s:.2} s"),
-            Self::Bumps { count, odd, weight, .. } => {
-                format!("a shape over the driver's turn ({count} sectors), {}", scaled(*odd, *weight))
-            }
         }
     }
 
@@ -247,7 +267,6 @@ impl Pattern {
             Self::Level { odd, weight, .. } => scaled(Carrier::None, *odd, *weight),
             Self::RunLevels { .. } | Self::Step { .. } => Signature::steady(Carrier::None, Parity::Mixed),
             Self::Tone { .. } => Signature::steady(Carrier::Time, Parity::Mixed),
-            Self::Bumps { odd, weight, .. } => scaled(Carrier::Input, *odd, *weight),
         }
     }
 }
