@@ -22,7 +22,8 @@ impl Effect for PitchCurveError {
 
     fn signature_of(&self, _rig: &Rig, shape: &Shape) -> Signature {
         if shape[..] == [1.0] {
-            Signature::steady(Carrier::None, Parity::Even).accumulating(Accumulates::PerRevolution)
+            // The parity of what accumulates is that of its growth a revolution, as for slip: ahead ccw, back cw.
+            Signature::steady(Carrier::None, Parity::Odd).accumulating(Accumulates::PerRevolution)
         } else {
             self.signature()
         }
