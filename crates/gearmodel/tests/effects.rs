@@ -262,6 +262,18 @@ fn curves_and_clocking_are_differences_of_the_transmission() {
             |theta, _| 0.5 * (more.theta2(theta) - less.theta2(theta)),
         );
     }
+    for (teeth, lobes) in [((40, 60), (2, 3)), ((60, 40), (3, 2)), ((30, 60), (1, 2)), ((44, 44), (2, 2))] {
+        let lobed = |eccentricity: f64| free(teeth, &CurveSpec::Lobed { eccentricity, lobes });
+        let (rig, dk) = (rig(&lobed(0.15)), 1e-5);
+        let (more, less) = (lobed(0.15 + dk), lobed(0.15 - dk));
+        compare(
+            &rig,
+            "pitch_curve_error",
+            1e-6,
+            |at| dk * row(&rig, "pitch_curve_error", &[0.0], at)[0],
+            |theta, _| 0.5 * (more.theta2(theta) - less.theta2(theta)),
+        );
+    }
     for pair in toothed() {
         let (rig, delta) = (rig(&pair), 1e-5);
         compare(

@@ -69,6 +69,20 @@ impl Rig {
         }
     }
 
+    /// ∂θ2/∂k at a fixed θ1, the centre distance following by closure; `None` for curves without an eccentricity k.
+    #[must_use]
+    pub fn theta2_slope_over_k(&self, theta2_rad: f64) -> Option<f64> {
+        match self.pair().pitch_curve() {
+            // 2 sin θ2/(1 − k²) from tan(θ2/2) = (1 + k)/(1 − k) tan(θ1/2)
+            AnyCurve::Ellipse(ellipse) => {
+                let k = ellipse.eccentricity();
+                Some(2.0 * theta2_rad.sin() / (1.0 - k * k))
+            }
+            AnyCurve::Lobed(lobed) => Some(lobed.theta2_slope_over_k(theta2_rad)),
+            _ => None,
+        }
+    }
+
     /// Fills in what follows from angle and sense.
     #[must_use]
     pub fn station(&self, theta1_rad: f64, theta2_rad: f64, direction: Direction) -> Station {
