@@ -642,7 +642,7 @@ fn heat_grows_the_centre_distance_and_saturates() {
 
 /// Stations of a turn in both senses.
 fn turn(rig: &Rig) -> Vec<Station> {
-    (0..720).flat_map(|n| Direction::BOTH.map(|d| station(rig, TAU * n as f64 / 720.0, d))).collect()
+    (0..720).flat_map(|n| Direction::BOTH.map(|d| station(rig, TAU * f64::from(n) / 720.0, d))).collect()
 }
 
 /// Principal angles between two effects' columns with a free zero, deg, ascending.
@@ -663,7 +663,7 @@ fn principal_deg(rig: &Rig, a: (&str, &[f64]), b: (&str, &[f64])) -> Vec<f64> {
 
 #[test]
 fn what_elliptic_gears_cannot_tell_apart_and_what_they_can() {
-    let (e1, e2): ((&str, &[f64]), (&str, &[f64])) = (("encoder1_eccentricity", &[]), ("encoder2_eccentricity", &[]));
+    let [e1, e2] = ["encoder1_eccentricity", "encoder2_eccentricity"].map(|name| (name, &[] as &[f64]));
     for k in [0.1, 0.3287, 0.6] {
         let rig = rig(&elliptic(k));
         assert!(principal_deg(&rig, e1, e2).iter().all(|deg| *deg < 0.2), "k = {k}");
