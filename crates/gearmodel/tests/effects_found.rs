@@ -81,7 +81,7 @@ fn an_encoder_on_a_soft_coupling_is_named_with_its_frequency() {
     assert_eq!(only(&found), "torsional_resonance");
     let f = value(&found, "torsional_resonance", "f_hz");
     assert!((f / f_hz - 1.0).abs() < 0.03, "{f} Hz");
-    let signature = serde_json::to_value(&found.location.signature).unwrap();
+    let signature = serde_json::to_value(found.location.signature).unwrap();
     assert_eq!((&signature["parity"], signature["speed_exponent"].as_f64()), (&"even".into(), Some(2.0)));
 }
 
@@ -95,5 +95,5 @@ fn a_profile_alike_in_both_senses_is_named_with_its_phase() {
     assert_eq!(only(&found), "profile_error");
     assert!((value(&found, "profile_error", "a1_mm") / 2e-3 - 1.0).abs() < 0.05);
     assert!((value(&found, "profile_error", "ph1_rad") - 0.9).abs() < 0.05);
-    assert_eq!(serde_json::to_value(&found.location.signature).unwrap()["parity"], "even");
+    assert_eq!(serde_json::to_value(found.location.signature).unwrap()["parity"], "even");
 }
