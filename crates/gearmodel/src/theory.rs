@@ -32,3 +32,9 @@ pub mod measured_figures {}
 
 #[doc = include_str!("../../../docs/theory/inseparable.md")]
 pub mod inseparable {}
+
+#[doc = include_str!("../../../docs/theory/effects.md")]
+pub mod effects {}
+
+#[doc = include_str!("../../../docs/theory/diagnosis.md")]
+pub mod diagnosis {}

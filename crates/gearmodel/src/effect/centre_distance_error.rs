@@ -19,6 +19,15 @@ impl Effect for CentreDistanceError {
         Signature::steady(Carrier::Input, Parity::Mixed)
     }
 
+    /// Where μ = 0 everywhere the two flanks lean alike, and nothing is left in common to both senses.
+    fn signature_of(&self, rig: &Rig, _shape: &Shape) -> Signature {
+        if rig.ratio_orders().is_empty() {
+            Signature { parity: Parity::Odd, ..self.signature() }
+        } else {
+            self.signature()
+        }
+    }
+
     fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
         row[0] = -at.sense * at.pressure_rad.tan() / at.r2_mm;
     }

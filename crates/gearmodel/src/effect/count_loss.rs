@@ -1,6 +1,6 @@
 //! A counter loses (or wins) counts at the output: steps of n counts, always the same way, that stay. TE = Σ steps so far ·
-//! 2π n/(counts a revolution). The shape lists the times of the steps, s (`gap::steps` finds them); the amplitude is one
-//! step.
+//! 2π n/(counts a revolution). The shape lists the times of the steps, s (`gap::events` finds them); the amplitude is one
+//! step, positive where the reading grows. The parameter `counts` is what is lost: positive where the reading falls.
 
 use std::f64::consts::TAU;
 
@@ -44,7 +44,7 @@ impl Effect for CountLoss {
         let steps = shape.len() as f64;
         let mut parameters = Vec::new();
         if let Some(counts_per_rev) = rig.output_counts_per_rev {
-            let counts = step_rad * counts_per_rev / TAU;
+            let counts = -step_rad * counts_per_rev / TAU;
             let std = found.std(0) * counts_per_rev / TAU;
             // A count is whole: a step known to a third of one is exactly that many.
             let whole = if std < 0.34 { counts.round() } else { counts };

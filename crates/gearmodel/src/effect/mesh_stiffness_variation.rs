@@ -19,7 +19,8 @@ impl Effect for MeshStiffnessVariation {
     }
 
     fn signature(&self) -> Signature {
-        Signature::steady(Carrier::Mesh, Parity::Odd).with_load(1.0)
+        // The wind-up turns its sign with the sense, but the cw flanks mesh half a pitch later: odd mesh orders turn it twice.
+        Signature::steady(Carrier::Mesh, Parity::Mixed).with_load(1.0)
     }
 
     fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {

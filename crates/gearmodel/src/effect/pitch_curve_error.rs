@@ -1,5 +1,5 @@
-//! The pitch curves are not those documented. Shape [0]: an elliptic pair's true k differs by dk and still closes,
-//! TE = dk ∂f/∂k. With tan(f/2) = c tan(θ1/2), c = (1+k)/(1−k): ∂f/∂k = 2 sin f/(1 − k²). Shape [1]: the pair closes
+//! The pitch curves are not those documented. Shape [0]: the true k of an elliptic or lobed pair differs by dk and still closes,
+//! TE = dk ∂f/∂k (`Rig::theta2_slope_over_k`). For one lobe, with tan(f/2) = c tan(θ1/2), c = (1+k)/(1−k): ∂f/∂k = 2 sin f/(1 − k²). Shape [1]: the pair closes
 //! otherwise (a wrong ratio), TE = dk·θ1, which grows with every revolution and returns when the sense turns.
 
 use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
@@ -22,7 +22,8 @@ impl Effect for PitchCurveError {
 
     fn signature_of(&self, _rig: &Rig, shape: &Shape) -> Signature {
         if shape[..] == [1.0] {
-            Signature::steady(Carrier::None, Parity::Even).accumulating(Accumulates::PerRevolution)
+            // The parity of what accumulates is that of its growth a revolution, as for slip: ahead ccw, back cw.
+            Signature::steady(Carrier::None, Parity::Odd).accumulating(Accumulates::PerRevolution)
         } else {
             self.signature()
         }
@@ -34,7 +35,7 @@ impl Effect for PitchCurveError {
 
     fn shapes(&self, rig: &Rig, plan: &Plan) -> Vec<Shape> {
         let mut shapes = Vec::new();
-        if rig.eccentricity().is_some() {
+        if rig.theta2_slope_over_k(0.0).is_some() {
             shapes.push(vec![0.0]);
         }
         if plan.revolutions > 1.0 {
@@ -44,12 +45,7 @@ impl Effect for PitchCurveError {
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
-        row[0] = if shape[..] == [1.0] {
-            at.theta1_rad
-        } else {
-            let k = rig.eccentricity().unwrap_or(0.0);
-            2.0 * at.theta2_rad.sin() / (1.0 - k * k)
-        };
+        row[0] = if shape[..] == [1.0] { at.theta1_rad } else { rig.theta2_slope_over_k(at.theta2_rad).unwrap_or(0.0) };
     }
 
     fn evolves(&self) -> bool {

@@ -1,5 +1,8 @@
-//! The same deviation of form on every tooth: lead Σ a_h cos(2π h u − φ_h) along the normal for h = 1, 2, 3, TE = lead/A. Shape
-//! [0]: one deviation for both flanks, counted from each flank's own tooth 0; shape [1]: a deviation a flank.
+//! The same deviation of form on every tooth: a lead Σ a_h sin(2π h u − φ_h) along the normal for h = 1, 2, 3, TE = lead/A.
+//!
+//! Shape [0]: alike in both senses over the rolled arc, u counted from tooth 0's ccw flank in both; shape [1]: a deviation a flank,
+//! the parameters being the ccw flank's; shape [2]: one deviation for both flanks, u counted from each flank's own tooth 0, so that
+//! odd orders turn their sign with the sense at equal θ1. Waves by cosine (`contact::Profile`) have their phase φ + π/2.
 
 use std::f64::consts::TAU;
 
@@ -8,6 +11,12 @@ use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Sign
 /// Profile deviation by mesh orders.
 pub(super) struct ProfileError;
 
+/// Alike in both senses over the rolled arc.
+const ALIKE: f64 = 0.0;
+/// A deviation a flank.
+const A_FLANK: f64 = 1.0;
+/// One deviation, counted from each flank's own tooth 0.
+const OWN_ZERO: f64 = 2.0;
 const ORDERS: usize = 3;
 const NAMES: [[&str; 2]; ORDERS] = [["a1_mm", "ph1_rad"], ["a2_mm", "ph2_rad"], ["a3_mm", "ph3_rad"]];
 
@@ -21,22 +30,27 @@ impl Effect for ProfileError {
     }
 
     fn signature(&self) -> Signature {
-        Signature::steady(Carrier::Mesh, Parity::Mixed)
+        Signature::steady(Carrier::Mesh, Parity::Even)
+    }
+
+    fn signature_of(&self, _rig: &Rig, shape: &Shape) -> Signature {
+        if shape[..] == [ALIKE] { self.signature() } else { Signature { parity: Parity::Mixed, ..self.signature() } }
     }
 
     fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
-        if plan.senses == [true, true] { vec![vec![0.0], vec![1.0]] } else { vec![vec![0.0]] }
+        if plan.senses == [true, true] { vec![vec![ALIKE], vec![A_FLANK], vec![OWN_ZERO]] } else { vec![vec![ALIKE]] }
     }
 
     fn width(&self, _rig: &Rig, shape: &Shape) -> usize {
-        if shape[..] == [1.0] { 4 * ORDERS } else { 2 * ORDERS }
+        if shape[..] == [A_FLANK] { 4 * ORDERS } else { 2 * ORDERS }
     }
 
     fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
-        let first = if shape[..] == [1.0] && at.sense < 0.0 { 2 * ORDERS } else { 0 };
+        let first = if shape[..] == [A_FLANK] && at.sense < 0.0 { 2 * ORDERS } else { 0 };
+        // `pitches` counts from each flank's own tooth 0: the cw flank's passes half a pitch later.
+        let from_ccw = if shape[..] == [OWN_ZERO] || at.sense > 0.0 { 0.0 } else { 0.5 };
         for h in 0..ORDERS {
-            let (sin, cos) = (TAU * (h + 1) as f64 * at.pitches).sin_cos();
-            // a cos(x − φ) = a sin(x − (φ − π/2)): columns sin, cos.
+            let (sin, cos) = (TAU * (h + 1) as f64 * (at.pitches + from_ccw)).sin_cos();
             row[first + 2 * h] = sin / at.arm_mm;
             row[first + 2 * h + 1] = cos / at.arm_mm;
         }
@@ -46,10 +60,9 @@ impl Effect for ProfileError {
         (0..ORDERS)
             .flat_map(|h| {
                 let polar = found.polar(2 * h);
-                let phase_rad = (polar.phase_rad + 0.25 * TAU + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
                 [
                     Parameter::number(NAMES[h][0], polar.amplitude, polar.amplitude_std, "mm"),
-                    Parameter::number(NAMES[h][1], phase_rad, polar.phase_std_rad, "rad"),
+                    Parameter::number(NAMES[h][1], polar.phase_rad, polar.phase_std_rad, "rad"),
                 ]
             })
             .collect()

@@ -10,6 +10,10 @@ use crate::{Direction, Errors, GearPair, NominalModel};
 
 /// Angles a turn at which the teeth in contact are looked up before their ends are refined.
 const ZONE_STEPS: usize = 720;
+/// Angles a turn at which the ratio is taken apart into orders of the driver.
+const RATIO_STEPS: usize = 512;
+/// Orders of the ratio smaller than this part of the largest are left out.
+const LEAST_ORDER: f64 = 1e-9;
 /// Halvings of an angle step until the end of a contact is known, to 0.002°.
 const HALVINGS: usize = 8;
 
@@ -24,6 +28,8 @@ pub struct Rig {
     /// From where to where each driver tooth's flank is in contact, pitches from its pitch point, by sense.
     spans: [Vec<Span>; 2],
     pitch_mm: f64,
+    /// Amplitudes of cos nθ1 and sin nθ1 in i21(θ1), n = 1, 2, …; empty where the ratio is constant.
+    ratio_orders: Vec<[f64; 2]>,
 }
 
 impl Rig {
@@ -32,7 +38,8 @@ impl Rig {
     pub fn new(model: NominalModel, lines: [Option<f64>; 2], output_counts_per_rev: Option<f64>) -> Self {
         let spans = spans(&model.pair);
         let pitch_mm = model.pair.pitch_mm().unwrap_or(f64::NAN);
-        Self { model, lines, output_counts_per_rev, spans, pitch_mm }
+        let ratio_orders = ratio_orders(&model.pair);
+        Self { model, lines, output_counts_per_rev, spans, pitch_mm, ratio_orders }
     }
 
     /// The pair.
@@ -47,11 +54,31 @@ impl Rig {
         &self.model
     }
 
+    /// Amplitudes of cos nθ1 and sin nθ1 in i21(θ1), n = 1, 2, …; empty where the ratio is constant.
+    #[must_use]
+    pub fn ratio_orders(&self) -> &[[f64; 2]] {
+        &self.ratio_orders
+    }
+
     /// k of an elliptic pair.
     #[must_use]
     pub fn eccentricity(&self) -> Option<f64> {
         match self.pair().pitch_curve() {
             AnyCurve::Ellipse(ellipse) => Some(ellipse.eccentricity()),
+            _ => None,
+        }
+    }
+
+    /// ∂θ2/∂k at a fixed θ1, the centre distance following by closure; `None` for curves without an eccentricity k.
+    #[must_use]
+    pub fn theta2_slope_over_k(&self, theta2_rad: f64) -> Option<f64> {
+        match self.pair().pitch_curve() {
+            // 2 sin θ2/(1 − k²) from tan(θ2/2) = (1 + k)/(1 − k) tan(θ1/2)
+            AnyCurve::Ellipse(ellipse) => {
+                let k = ellipse.eccentricity();
+                Some(2.0 * theta2_rad.sin() / (1.0 - k * k))
+            }
+            AnyCurve::Lobed(lobed) => Some(lobed.theta2_slope_over_k(theta2_rad)),
             _ => None,
         }
     }
@@ -137,6 +164,30 @@ impl Span {
     fn single_pair_duty(&self) -> f64 {
         (2.0 - (self.to - self.from)).clamp(0.0, 1.0)
     }
+}
+
+/// Orders of the driver's turn in the ratio: a discrete Fourier transform, exact for curves whose orders end below half of its steps.
+fn ratio_orders(pair: &GearPair) -> Vec<[f64; 2]> {
+    let ratios: Vec<f64> = (0..RATIO_STEPS).map(|n| pair.ratio(TAU * n as f64 / RATIO_STEPS as f64)).collect();
+    let mut orders: Vec<[f64; 2]> = (1..RATIO_STEPS / 4)
+        .map(|order| {
+            let (mut cosine, mut sine) = (0.0, 0.0);
+            for (n, ratio) in ratios.iter().enumerate() {
+                let (sin, cos) = (TAU * (order * n % RATIO_STEPS) as f64 / RATIO_STEPS as f64).sin_cos();
+                cosine += ratio * cos;
+                sine += ratio * sin;
+            }
+            [2.0 * cosine / RATIO_STEPS as f64, 2.0 * sine / RATIO_STEPS as f64]
+        })
+        .collect();
+    let size = |order: &[f64; 2]| order[0].hypot(order[1]);
+    let mean = ratios.iter().sum::<f64>() / RATIO_STEPS as f64;
+    let largest = orders.iter().map(size).fold(0.0, f64::max);
+    // What rounding leaves of a constant ratio is none.
+    let least = LEAST_ORDER * largest.max(1e-3 * mean);
+    let last = orders.iter().rposition(|order| size(order) > least).map_or(0, |n| n + 1);
+    orders.truncate(last);
+    orders
 }
 
 /// Contact of every driver tooth's flank, by sense; empty where there are no teeth.

@@ -19,6 +19,15 @@ impl Effect for ThermalDrift {
         Signature::steady(Carrier::Time, Parity::Mixed).accumulating(Accumulates::PerTime)
     }
 
+    /// Where μ = 0 everywhere the two flanks lean alike, and nothing is left in common to both senses.
+    fn signature_of(&self, rig: &Rig, _shape: &Shape) -> Signature {
+        if rig.ratio_orders().is_empty() {
+            Signature { parity: Parity::Odd, ..self.signature() }
+        } else {
+            self.signature()
+        }
+    }
+
     /// From a twelfth of the campaign (faster than that it is a constant) to thrice its length (a straight line).
     fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
         [0.08, 0.16, 0.3, 0.6, 1.2, 3.0].into_iter().map(|part| vec![part * plan.duration_s.max(1e-3)]).collect()

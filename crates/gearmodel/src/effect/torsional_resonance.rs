@@ -1,10 +1,30 @@
-//! The drive train rings: an excitation at the mesh (kind 1) or once a turn (kind 0) comes through amplified by
+//! Something on the drive train is soft enough to ring. Three kinds; the shape is [kind, f, ζ].
+//!
+//! Kinds 0 and 1: an excitation once a turn (0) or at the mesh (1) of unknown amplitude a comes through amplified by
 //! H(ν) = 1/(1 − (ν/f)² + 2jζ ν/f) at its frequency ν. Its part beyond the quasi-static one is the trace:
-//! TE = Re[(H(ν) − 1)·a e^{jx}], x = 2π u or θ1. The shape is [kind, f, ζ].
+//! TE = Re[(H(ν) − 1)·a e^{jx}], x = θ1 or 2π u.
+//!
+//! Kind 2: the output encoder hangs on a soft coupling, and the pair's own uneven motion excites it: ẍ + 2ζω0 ẋ + ω0² x = −q̈ for the
+//! disc's lead x, with q = f(θ1) and ω0 = 2πf. At the driver's speed ω, with the orders of the ratio i = Σ Re(c_n e^{jnθ1}), the steady motion is
+//! TE = x = −Re Σ jn ω² c_n e^{jnθ1}/(ω0² − (nω)² + 2jζω0 nω), far below f −ω² (di/dθ1)/ω0²: alike in both senses, at every load.
+//! Nothing is free in it but f and ζ, so the amplitude found must be 1: where it is β, the coupling's f is f/√β.
 
 use std::f64::consts::TAU;
 
 use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+
+/// Once a turn of the driver.
+const TURN: f64 = 0.0;
+/// At the tooth mesh.
+const MESH: f64 = 1.0;
+/// The output encoder on its coupling.
+const ENCODER: f64 = 2.0;
+/// First resonances of the encoder tried, in turns of the driver; the amplitude found moves them to where it is 1.
+const ENCODER_ORDERS: [f64; 3] = [6.0, 15.0, 100.0];
+/// Damping ratio of the encoder's coupling tried first: far below the resonance it does not show.
+const ENCODER_ZETA: f64 = 0.05;
+/// How far the amplitude of kind 2 may be from 1, as a factor of f.
+const CONSISTENT: f64 = 0.01;
 
 /// Torsional resonance of the drive train.
 pub(super) struct TorsionalResonance;
@@ -19,7 +39,16 @@ impl Effect for TorsionalResonance {
     }
 
     fn signature(&self) -> Signature {
-        Signature::steady(Carrier::Mesh, Parity::Mixed).with_speed(Some(2.0))
+        Signature::steady(Carrier::Input, Parity::Even).with_speed(Some(2.0))
+    }
+
+    fn signature_of(&self, _rig: &Rig, shape: &Shape) -> Signature {
+        match shape.first() {
+            // Phase and gain of what is excited from outside turn with the sense.
+            Some(&TURN) => Signature { parity: Parity::Mixed, ..self.signature() },
+            Some(&MESH) => Signature { carrier: Carrier::Mesh, parity: Parity::Mixed, ..self.signature() },
+            _ => self.signature(),
+        }
     }
 
     fn applies(&self, _rig: &Rig) -> bool {
@@ -35,7 +64,7 @@ impl Effect for TorsionalResonance {
             return Vec::new();
         }
         let mut shapes = Vec::new();
-        for (kind, per_turn) in [(0.0, 1.0), (1.0, f64::from(rig.pair().teeth().0))] {
+        for (kind, per_turn) in [(TURN, 1.0), (MESH, f64::from(rig.pair().teeth().0))] {
             if per_turn == 0.0 {
                 continue;
             }
@@ -43,6 +72,9 @@ impl Effect for TorsionalResonance {
                 let f_hz = per_turn * high / TAU * 0.4 * 1.35_f64.powi(n);
                 shapes.extend([0.02, 0.1].map(|zeta| vec![kind, f_hz, zeta]));
             }
+        }
+        if !rig.ratio_orders().is_empty() {
+            shapes.extend(ENCODER_ORDERS.map(|order| vec![ENCODER, order * high / TAU, ENCODER_ZETA]));
         }
         shapes
     }
@@ -61,18 +93,32 @@ impl Effect for TorsionalResonance {
         shapes
     }
 
-    fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
-        2
+    /// Kind 2 at the f whose amplitude is 1.
+    fn refine(&self, _rig: &Rig, shape: &Shape, beta: &[f64]) -> Option<Shape> {
+        let ([ENCODER, f_hz, zeta], [amplitude]) = (&shape[..], beta) else { return None };
+        let factor = 1.0 / amplitude.sqrt();
+        // A negative amplitude has no f, an immense one means that there is nothing.
+        (factor.is_finite() && (factor - 1.0).abs() > CONSISTENT).then(|| vec![ENCODER, f_hz * factor, *zeta])
+    }
+
+    fn width(&self, _rig: &Rig, shape: &Shape) -> usize {
+        if shape.first() == Some(&ENCODER) { 1 } else { 2 }
+    }
+
+    /// Of kind 2, whose amplitude is (f/f_true)²; the others have two amplitudes, of either sign.
+    fn one_sided(&self) -> bool {
+        true
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
         let [kind, f_hz, zeta] = shape[..] else { return };
-        let (phase_rad, frequency_hz) = if kind == 1.0 {
-            // u advances by Z/perimeter·ds/dθ1 a radian: with ds = r1/cos μ dθ1 the mesh frequency follows the local radius.
-            let lean_rad = at.sense * (rig.pair().pressure_angle_rad() - at.pressure_rad);
-            let pitches_per_rad =
-                at.r2_mm * at.ratio / lean_rad.cos() * f64::from(rig.pair().teeth().0) / rig.pair().perimeter_mm();
-            (TAU * at.pitches, pitches_per_rad * at.speed_rad_per_s.abs())
+        if kind == ENCODER {
+            row[0] = encoder_lead_rad(rig, f_hz, zeta, at);
+            return;
+        }
+        let (phase_rad, frequency_hz) = if kind == MESH {
+            // The mesh frequency follows the local radius.
+            (TAU * at.pitches, at.pitches_per_rad * at.speed_rad_per_s.abs())
         } else {
             (at.theta1_rad, at.speed_rad_per_s.abs() / TAU)
         };
@@ -87,8 +133,35 @@ impl Effect for TorsionalResonance {
     }
 
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
-        let mut parameters = vec![Parameter::grid("f_hz", shape[1], "Hz"), Parameter::grid("zeta", shape[2], "")];
+        let [kind, f_hz, zeta] = shape[..] else { return Vec::new() };
+        if kind == ENCODER {
+            // β = (f_shape/f)², so f = f_shape/√β and df = f dβ/(2β).
+            let amplitude = found.beta[0].max(f64::MIN_POSITIVE);
+            let f_hz = f_hz / amplitude.sqrt();
+            let std_hz = 0.5 * f_hz * found.std(0) / amplitude;
+            return vec![Parameter::number("f_hz", f_hz, std_hz, "Hz"), Parameter::grid("zeta", zeta, "")];
+        }
+        let mut parameters = vec![Parameter::grid("f_hz", f_hz, "Hz"), Parameter::grid("zeta", zeta, "")];
         parameters.extend(found.polar(0).parameters("excitation_rad", "rad"));
         parameters
     }
+}
+
+/// Steady lead of the output encoder's disc over its shaft, rad (kind 2).
+fn encoder_lead_rad(rig: &Rig, f_hz: f64, zeta: f64, at: &Station) -> f64 {
+    let omega0 = TAU * f_hz;
+    let omega = at.speed_rad_per_s;
+    let (step_sin, step_cos) = at.theta1_rad.sin_cos();
+    // e^{jnθ1}, turned on order by order.
+    let (mut cos, mut sin) = (1.0, 0.0);
+    let mut lead_rad = 0.0;
+    for (n, [a, b]) in (1_u32..).zip(rig.ratio_orders()) {
+        (cos, sin) = (cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin);
+        let order_omega = f64::from(n) * omega;
+        // q̈_n = Re Z, Z/(n ω²) = (b + ja) e^{jnθ1}.
+        let (z_re, z_im) = (b * cos - a * sin, b * sin + a * cos);
+        let (re, im) = (omega0 * omega0 - order_omega * order_omega, 2.0 * zeta * omega0 * order_omega);
+        lead_rad -= omega * order_omega * (z_re * re + z_im * im) / (re * re + im * im);
+    }
+    lead_rad
 }

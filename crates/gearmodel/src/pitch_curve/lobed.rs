@@ -88,6 +88,18 @@ impl Lobed {
             relative_distance: self.relative_distance,
         }
     }
+
+    /// ∂θ2/∂k at a fixed θ1, where the driven gear stands at θ2, the centre distance following k by closure.
+    ///
+    /// With i = C √(1 − b²)/(1 − b cos n1θ1): tan(n2θ2/2) = √((1 + b)/(1 − b)) tan(n1θ1/2) and b = k (1 + C s), s = √(1 − b²), so
+    /// ∂θ2/∂k = sin n2θ2/(n2 s²) · (1 + C s)/(1 + k C b/s). For one lobe each it is the ellipse's 2 sin θ2/(1 − k²).
+    #[must_use]
+    pub fn theta2_slope_over_k(&self, theta2_rad: f64) -> f64 {
+        let b = 2.0 * self.q / (1.0 + self.q * self.q);
+        let (closure, s) = (self.n1 / self.n2, (1.0 - b * b).sqrt());
+        let b_slope = (1.0 + closure * s) / (1.0 + self.k * closure * b / s);
+        (self.n2 * theta2_rad).sin() / (self.n2 * s * s) * b_slope
+    }
 }
 
 impl PitchCurve for Lobed {
