@@ -25,6 +25,8 @@ const RUN_RATIOS: [f64; 6] = [0.02, 0.08, 0.3, 1.0, 3.0, 10.0];
 const RUN_RATIO_SPREAD: f64 = 1.5;
 /// Evidence from which a wave that does not close with the turn is taken into the pool, nats.
 const WANDERING_NATS: f64 = 8.0;
+/// A set with an event that alone scores so much less than the best is not searched about, nats.
+const NEAR_NATS: f64 = 30.0;
 /// Blocks smaller than this part of the largest are left out while its shape is moved.
 const LARGE: f64 = 0.12;
 /// Steps in which shapes are moved, in parts of their grid's.
@@ -324,7 +326,9 @@ impl<'a> Engine<'a> {
         let ratio = self.noise.run_ratio;
         self.noise = Noise::estimate(&self.grid, &self.pool, &amplitudes);
         self.noise.run_ratio = ratio;
-        self.choose_run_ratio();
+        if let Some(best) = &self.best {
+            self.noise.run_ratio = self.best_run_ratio(&self.noise, &self.pool, &best.fit);
+        }
     }
 
     /// Searches under the present noise, from nothing and from the last best model.
@@ -351,104 +355,119 @@ impl<'a> Engine<'a> {
         self.best = best;
     }
 
-    /// The scatter between runs that the best model leaves, weighed on a grid.
-    fn choose_run_ratio(&mut self) {
-        let Some(best) = &self.best else { return };
+    /// The scatter between runs that a fit leaves, weighed on a grid.
+    fn best_run_ratio(&self, noise: &Noise, pool: &Pool, fit: &evidence::Fit) -> [f64; 2] {
         if self.grid.plan.runs < 2 {
-            return;
+            return noise.run_ratio;
         }
-        let mut chosen = (f64::NEG_INFINITY, self.noise.run_ratio);
+        let mut columns = vec![evidence::RESIDUAL];
+        columns.extend(&fit.columns);
+        let mut chosen = (f64::NEG_INFINITY, noise.run_ratio);
         for level in RUN_RATIOS {
             for waves in RUN_RATIOS {
-                let mut noise = self.noise.clone();
+                let mut noise = noise.clone();
                 noise.run_ratio = [level, waves];
-                let mut columns = vec![evidence::RESIDUAL];
-                columns.extend(&best.fit.columns);
-                let whitened = noise.whiten_runs(&self.grid, &self.pool, Some(&columns));
+                let whitened = noise.whiten_runs(&self.grid, pool, Some(&columns));
                 let log_prior: f64 = [level, waves]
                     .iter()
                     .zip(FIRST_RUN_RATIO)
                     .map(|(ratio, usual)| -0.5 * ((ratio / usual).ln() / RUN_RATIO_SPREAD).powi(2))
                     .sum();
-                let score = evidence::at_scales(&self.pool, &whitened, &best.fit) + log_prior;
+                let score = evidence::at_scales(pool, &whitened, fit) + log_prior;
                 if score > chosen.0 {
                     chosen = (score, noise.run_ratio);
                 }
             }
         }
-        self.noise.run_ratio = chosen.1;
+        chosen.1
     }
 
     /// Moves the shapes of the best model's larger effects to where they fit best, the small ones left out: what a shape on
-    /// a grid misses must not be made up by other effects. Then both sets compete.
+    /// a grid misses must not be made up by other effects. Then both sets compete. Works in a pool of its own, which stays
+    /// small.
     fn sharpen(&mut self) -> bool {
-        let Some(best) = self.best.clone() else { return false };
+        let Some(best) = &self.best else { return false };
         let largest = (0..best.fit.set.len()).map(|n| self.rms_rad(&best.fit, n)).fold(0.0, f64::max);
-        let mut set: Vec<usize> = (0..best.fit.set.len())
+        let large: Vec<usize> = (0..best.fit.set.len())
             .filter(|n| self.rms_rad(&best.fit, *n) > LARGE * largest)
             .map(|n| best.fit.set[n])
             .collect();
-        let before = set.clone();
+        let mut few = Pool::new(&self.grid);
+        let causes: Vec<Cause> = large.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
+        let mut set = few.add(&self.grid, self.rig, causes);
+        if set.len() < large.len() {
+            return false;
+        }
+        let mut changed = false;
         for step in SHARPENING_STEPS {
             let mut moved = false;
             for n in 0..set.len() {
-                moved |= self.sharpen_block(&mut set, n, step);
+                moved |= self.sharpen_block(&mut few, &mut set, n, step);
             }
+            changed |= moved;
             if !moved && step < 0.2 {
                 break;
             }
         }
-        set.sort_unstable();
-        let changed = set != before;
-        self.large = Some(set);
+        if changed {
+            let shaped: Vec<Cause> = set.iter().map(|b| few.blocks[*b].cause.clone()).collect();
+            let known: Vec<Option<usize>> = shaped.iter().map(|cause| self.block_of(cause)).collect();
+            let fresh =
+                shaped.iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(cause, _)| cause.clone()).collect();
+            let mut added = self.pool.add(&self.grid, self.rig, fresh).into_iter();
+            let mut set: Vec<usize> = known.into_iter().filter_map(|k| k.or_else(|| added.next())).collect();
+            set.sort_unstable();
+            self.large = Some(set);
+        }
         changed
     }
 
-    /// Tries the shapes about that of block `n` of a set, and puts the best in its place.
-    fn sharpen_block(&mut self, set: &mut [usize], n: usize, step: f64) -> bool {
-        let Cause::Effect { effect, number, shape, cost_nats } = self.pool.blocks[set[n]].cause.clone() else {
-            return false;
+    /// Block of the pool with the same effect and shape.
+    fn block_of(&self, cause: &Cause) -> Option<usize> {
+        let Cause::Effect { number, shape, .. } = cause else {
+            return self.pool.blocks.iter().position(|b| match (&b.cause, cause) {
+                (Cause::Unknown(a), Cause::Unknown(b)) => a == b,
+                _ => false,
+            });
         };
-        let Some(now) = evidence::fit(&self.pool, &self.whitened, set, &[]) else { return false };
+        self.pool
+            .blocks
+            .iter()
+            .position(|b| matches!(&b.cause, Cause::Effect { number: m, shape: s, .. } if m == number && s == shape))
+    }
+
+    /// Tries the shapes about that of block `n` of a set, and puts the best in its place.
+    fn sharpen_block(&self, few: &mut Pool, set: &mut [usize], n: usize, step: f64) -> bool {
+        let Cause::Effect { effect, number, shape, cost_nats } = few.blocks[set[n]].cause.clone() else { return false };
+        let whitened = self.noise.whiten(&self.grid, few);
+        let Some(now) = evidence::fit(few, &whitened, set, &[]) else { return false };
         let mut shapes = effect.neighbours(&shape, step);
-        let beta = self.amplitudes_of(&now, n).beta;
-        shapes.extend(effect.refine(self.rig, &shape, &beta));
-        let fresh: Vec<Cause> = shapes
-            .into_iter()
-            .filter(|shape| {
-                !self.pool.blocks.iter().any(
-                    |b| matches!(&b.cause, Cause::Effect { number: m, shape: s, .. } if *m == number && s == shape),
-                )
-            })
-            .map(|shape| Cause::Effect { effect, number, shape, cost_nats })
-            .collect();
+        shapes.extend(effect.refine(self.rig, &shape, &amplitudes_of(few, &now, n).beta));
+        let fresh: Vec<Cause> =
+            shapes.into_iter().map(|shape| Cause::Effect { effect, number, shape, cost_nats }).collect();
         if fresh.is_empty() {
             return false;
         }
-        let tried = self.pool.add(&self.grid, self.rig, fresh);
-        self.whitened = self.noise.whiten_set(&self.grid, &self.pool, &self.whitened, set, &tried);
+        let tried = few.add(&self.grid, self.rig, fresh);
+        let whitened = self.noise.whiten(&self.grid, few);
         let mut winner = (now.log_evidence, set[n]);
         for block in &tried {
             let mut other = set.to_vec();
             other[n] = *block;
-            if let Some(fit) = evidence::fit(&self.pool, &self.whitened, &other, &now.scales_rad)
+            if let Some(fit) = evidence::fit(few, &whitened, &other, &now.scales_rad)
                 && fit.log_evidence > winner.0
             {
                 winner = (fit.log_evidence, *block);
             }
         }
-        let moved = winner.1 != set[n];
-        set[n] = winner.1;
-        // Only the winner stays: the pool must not grow with every step.
-        let kept = self.pool.keep_of(&tried, winner.1);
-        if moved {
-            set[n] = kept.unwrap_or(set[n]);
+        // Only the winner stays.
+        match few.keep_of(&tried, winner.1) {
+            Some(kept) => {
+                set[n] = kept;
+                true
+            }
+            None => false,
         }
-        self.whitened = self.whitened.first(self.pool.width());
-        if let Some(kept) = kept {
-            self.whitened = self.noise.whiten_set(&self.grid, &self.pool, &self.whitened, set, &[kept]);
-        }
-        moved
     }
 
     /// The best model's blocks without what moves the level from revolution to revolution or run to run.
@@ -508,7 +527,8 @@ impl<'a> Engine<'a> {
         changed
     }
 
-    /// Looks for waves over the driver's angle that do not close with its turn, and takes the best into the pool where it is worth it.
+    /// Looks for waves over the driver's angle that do not close with its turn, in a pool of its own, and takes the best into the
+    /// pool where it is worth it.
     fn look_for_wandering_waves(&mut self) -> bool {
         let (low, high) = self
             .grid
@@ -520,34 +540,33 @@ impl<'a> Engine<'a> {
         if let [Pattern::Order { order: a, .. }, Pattern::Order { order: b, .. }, ..] = &patterns[..] {
             step = b - a;
         }
-        let mut kept: Option<usize> = None;
+        let found: Vec<Cause> =
+            self.best.iter().flat_map(|m| &m.fit.set).map(|b| self.pool.blocks[*b].cause.clone()).collect();
+        let mut best: Option<(Pattern, f64)> = None;
         for _ in 0..3 {
-            if patterns.is_empty() {
-                break;
+            let mut few = Pool::new(&self.grid);
+            let set = few.add(&self.grid, self.rig, found.clone());
+            let tried = few.add(&self.grid, self.rig, patterns.iter().cloned().map(Cause::Unknown).collect());
+            let whitened = self.noise.whiten(&self.grid, &few);
+            let Some(fit) = evidence::fit(&few, &whitened, &set, &[]) else { return false };
+            for (block, gain) in tried.iter().zip(evidence::scan(&few, &whitened, &fit, &tried)) {
+                if let Cause::Unknown(pattern) = &few.blocks[*block].cause
+                    && best.as_ref().is_none_or(|(_, g)| gain > *g)
+                {
+                    best = Some((pattern.clone(), gain));
+                }
             }
-            let added = self.pool.add(&self.grid, self.rig, patterns.drain(..).map(Cause::Unknown).collect());
-            self.whitened = self.noise.whiten(&self.grid, &self.pool);
-            let set: Vec<usize> = self.best.as_ref().map(|m| m.fit.set.clone()).unwrap_or_default();
-            let candidates: Vec<usize> = kept.into_iter().chain(added.iter().copied()).collect();
-            let Some(fit) = evidence::fit(&self.pool, &self.whitened, &set, &[]) else { return false };
-            let gains = evidence::scan(&self.pool, &self.whitened, &fit, &candidates);
-            let best = candidates.iter().zip(&gains).max_by(|a, b| a.1.total_cmp(b.1));
-            let Some((&block, _)) = best.filter(|(_, gain)| **gain > WANDERING_NATS) else {
-                self.pool.keep_of(&candidates, usize::MAX);
-                self.whitened = self.whitened.first(self.pool.width());
-                return false;
-            };
-            kept = self.pool.keep_of(&candidates, block);
-            if let Some(Cause::Unknown(pattern)) = kept.map(|b| self.pool.blocks[b].cause.clone()) {
-                patterns = pattern.nearer(step);
-            }
+            let Some((pattern, _)) = best.as_ref().filter(|(_, gain)| *gain > WANDERING_NATS) else { return false };
+            patterns = pattern.nearer(step);
             step *= 0.5;
         }
-        self.whitened = self.noise.whiten(&self.grid, &self.pool);
-        if let Some(block) = kept {
-            self.weigh_event(block);
+        let Some((pattern, _)) = best else { return false };
+        let added = self.pool.add(&self.grid, self.rig, vec![Cause::Unknown(pattern)]);
+        for block in &added {
+            self.weigh_event(*block);
         }
-        kept.is_some()
+        self.whitened = self.noise.whiten(&self.grid, &self.pool);
+        !added.is_empty()
     }
 
     /// Steps and tones pass for scatter until they are taken off: a model with the event is weighed under the noise that it
@@ -556,41 +575,44 @@ impl<'a> Engine<'a> {
         let mut set = self.steady_set();
         set.push(block);
         set.sort_unstable();
-        let whitened = self.noise.whiten(&self.grid, &self.pool);
-        let Some(fit) = evidence::fit(&self.pool, &whitened, &set, &[]) else { return };
-        let kept = (self.noise.clone(), std::mem::replace(&mut self.whitened, whitened), self.best.take());
-        let score =
-            Search::new(&self.pool, &self.whitened, &self.options.known).model(set.clone(), None).map(|m| m.score);
-        self.best = Some(Model { fit, score: score.unwrap_or(f64::NEG_INFINITY) });
-        self.estimate_noise();
-        self.whitened = self.noise.whiten(&self.grid, &self.pool);
-        let mut search = Search::new(&self.pool, &self.whitened, &self.options.known);
-        let with_event = search.climb(set, true);
-        let before = kept.2.as_ref().map_or(f64::NEG_INFINITY, |m| m.score);
-        match with_event {
-            Some(model) if model.score > before => self.best = Some(model),
-            _ => {
-                (self.noise, self.whitened, self.best) = kept;
-                // The pool has grown since.
-                self.whitened = self.noise.whiten(&self.grid, &self.pool);
-            }
+        let before = self.best.as_ref().map_or(f64::NEG_INFINITY, |m| m.score);
+        // The set alone first, in a pool of its own: most events that are none fail here.
+        let causes: Vec<Cause> = set.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
+        let mut few = Pool::new(&self.grid);
+        let own = few.add(&self.grid, self.rig, causes);
+        let whitened = self.noise.whiten(&self.grid, &few);
+        let Some(fit) = evidence::fit(&few, &whitened, &own, &[]) else { return };
+        let mut noise = Noise::estimate(&self.grid, &few, &fit.amplitudes());
+        noise.run_ratio = self.noise.run_ratio;
+        noise.run_ratio = self.best_run_ratio(&noise, &few, &fit);
+        let alone = Search::new(&few, &noise.whiten(&self.grid, &few), &self.options.known).model(own, None);
+        if alone.is_none_or(|model| model.score < before - NEAR_NATS) {
+            return;
+        }
+        let whitened = noise.whiten(&self.grid, &self.pool);
+        let with_event = Search::new(&self.pool, &whitened, &self.options.known).climb(set, true);
+        if let Some(model) = with_event.filter(|model| model.score > before) {
+            self.best = Some(model);
+            self.noise = noise;
+            self.whitened = whitened;
         }
     }
 
     /// Amplitudes of block `n` of a model in the effect's own units.
     fn raw(&self, model: &Model, n: usize) -> Estimate {
-        self.amplitudes_of(&model.fit, n)
+        amplitudes_of(&self.pool, &model.fit, n)
     }
+}
 
-    fn amplitudes_of(&self, fit: &evidence::Fit, n: usize) -> Estimate {
-        let block = &self.pool.blocks[fit.set[n]];
-        let place = fit.place(&self.pool, n);
-        let mean = fit.mean.rows(place.start, place.len());
-        let covariance = fit.covariance.view((place.start, place.start), (place.len(), place.len()));
-        Estimate {
-            beta: (&block.transform * mean).iter().copied().collect(),
-            covariance: &block.transform * covariance * block.transform.transpose(),
-        }
+/// Amplitudes of block `n` of a fit in the effect's own units.
+fn amplitudes_of(pool: &Pool, fit: &evidence::Fit, n: usize) -> Estimate {
+    let block = &pool.blocks[fit.set[n]];
+    let place = fit.place(pool, n);
+    let mean = fit.mean.rows(place.start, place.len());
+    let covariance = fit.covariance.view((place.start, place.start), (place.len(), place.len()));
+    Estimate {
+        beta: (&block.transform * mean).iter().copied().collect(),
+        covariance: &block.transform * covariance * block.transform.transpose(),
     }
 }
 

@@ -82,15 +82,6 @@ pub struct Whitened {
     pub log_det: f64,
 }
 
-impl Whitened {
-    /// The same without the columns from `width` on.
-    #[must_use]
-    pub fn first(&self, width: usize) -> Self {
-        let width = width.min(self.gram.nrows());
-        Self { gram: self.gram.view((0, 0), (width, width)).into_owned(), log_det: self.log_det }
-    }
-}
-
 impl Noise {
     /// Estimates the scatter from what differs between revolutions of a run after the model `amplitudes` (column,
     /// amplitude) is taken off.
@@ -173,26 +164,6 @@ impl Noise {
     #[must_use]
     pub fn whiten(&self, grid: &Grid, pool: &Pool) -> Whitened {
         self.whiten_runs(grid, pool, None)
-    }
-
-    /// `known` grown to the pool's width, with the entries that a fit of `set` with one of `added` needs.
-    #[must_use]
-    pub fn whiten_set(&self, grid: &Grid, pool: &Pool, known: &Whitened, set: &[usize], added: &[usize]) -> Whitened {
-        let mut columns = vec![super::evidence::RESIDUAL, super::evidence::ZERO];
-        columns.extend(set.iter().chain(added).flat_map(|b| pool.blocks[*b].columns.clone()));
-        columns.sort_unstable();
-        columns.dedup();
-        let part = self.whiten_runs(grid, pool, Some(&columns));
-        let width = pool.width();
-        let old = known.gram.nrows();
-        let mut gram = DMatrix::zeros(width, width);
-        gram.view_mut((0, 0), (old, old)).copy_from(&known.gram);
-        for (m, a) in columns.iter().enumerate() {
-            for (n, b) in columns.iter().enumerate() {
-                gram[(*a, *b)] = part.gram[(m, n)];
-            }
-        }
-        Whitened { gram, log_det: known.log_det }
     }
 
     /// The same of some columns only.
