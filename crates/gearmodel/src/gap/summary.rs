@@ -22,7 +22,7 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     } else {
         let _ = writeln!(out, "where {}", words::location(diagnosis));
     }
-    for item in &diagnosis.verdict {
+    for item in words::ranked(diagnosis) {
         why(&mut out, diagnosis, item);
     }
     let _ = writeln!(out, "also  {}", also(diagnosis));
@@ -154,7 +154,11 @@ fn also(diagnosis: &Diagnosis) -> String {
 }
 
 fn closes(shrink: Option<f64>) -> String {
-    shrink.map_or_else(String::new, |shrink| format!("   closes {}", percent(shrink)))
+    match shrink {
+        None => String::new(),
+        Some(shrink) if shrink < 0.005 => "   closes next to nothing".to_owned(),
+        Some(shrink) => format!("   closes {}", percent(shrink)),
+    }
 }
 
 /// Parameters with their standard deviations, one after the other.

@@ -8,8 +8,8 @@ use crate::gap::summary::words;
 const URAD: f64 = 1e6;
 /// Most bars in one chart; more are joined by their RMS.
 const MOST_BARS: usize = 48;
-/// Most points of a curve.
-const MOST_POINTS: usize = 180;
+/// Most points of a curve: fifteen a tooth of the common gears, so that no mesh order is averaged away.
+const MOST_POINTS: usize = 720;
 /// Most runs drawn one by one.
 pub const MOST_RUNS: usize = 24;
 
@@ -50,7 +50,7 @@ pub fn budget(diagnosis: &Diagnosis) -> String {
     let mut x = 0.0;
     for (n, row) in rows.iter().enumerate() {
         let width = 700.0 * row.share.max(0.0) / total;
-        let tip = format!("{}: {}", words::plain(&row.effect), percent(row.share));
+        let tip = format!("{}: {}", words::within(diagnosis, &row.effect), percent(row.share));
         svg.rect(&part_class(n, &row.effect), [x, 2.0], [width, 30.0], &tip);
         if width > 60.0 {
             svg.text("t on", [x + width / 2.0, 22.0], Anchor::Middle, &percent(row.share));
@@ -127,18 +127,21 @@ pub fn turn_axis(svg: &mut Svg, [x0, y]: [f64; 2], width: f64) {
     for quarter in 0..=4 {
         let x = x0 + width * f64::from(quarter) / 4.0;
         svg.line("axis", [x, y], [x, y + 4.0]);
-        svg.text("t small", [x, y + 16.0], Anchor::Middle, &format!("{}°", 90 * quarter));
+        // The last label ends at the frame, or it would be cut off.
+        let anchor = if quarter == 4 { Anchor::End } else { Anchor::Middle };
+        svg.text("t small", [x, y + 16.0], anchor, &format!("{}°", 90 * quarter));
     }
 }
 
 /// Label of a run.
 pub fn run_label(curve: &Curve) -> String {
     use crate::gap::summary::quantity::plain;
-    let round = |x: f64| plain((x * 1e3).round() / 1e3);
+    // Means of what was measured: three digits tell runs apart.
+    let round = |x: f64| if x.abs() < 1.0 { plain((x * 1e3).round() / 1e3) } else { plain((x * 10.0).round() / 10.0) };
     format!("{} {} N·m {} rpm", curve.direction, round(curve.load_nm), round(curve.speed_rpm))
 }
 
-/// The scale that all runs share: the 98th percentile of what is drawn, so that single steps do not flatten the rest.
+/// The scale that all runs share: the largest value, or the 98th percentile where single steps would flatten the rest.
 pub fn shared_scale_rad(curves: &[Curve]) -> f64 {
     let mut sizes: Vec<f64> = curves
         .iter()
@@ -147,8 +150,17 @@ pub fn shared_scale_rad(curves: &[Curve]) -> f64 {
         .filter(|x| x.is_finite())
         .collect();
     sizes.sort_by(f64::total_cmp);
-    let at = (0.98 * sizes.len() as f64) as usize;
-    sizes.get(at.min(sizes.len().saturating_sub(1))).copied().filter(|s| *s > 0.0).unwrap_or(1e-6)
+    let usual = sizes.get((0.98 * sizes.len() as f64) as usize).copied().unwrap_or(0.0);
+    match sizes.last() {
+        Some(largest) if *largest > 0.0 => {
+            if *largest > 2.5 * usual && usual > 0.0 {
+                usual
+            } else {
+                *largest
+            }
+        }
+        _ => 1e-6,
+    }
 }
 
 /// Mean residual of one run over the turn, before and after.

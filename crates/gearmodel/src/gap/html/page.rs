@@ -10,14 +10,29 @@ use crate::gap::summary::{self, words};
 
 const STYLE: &str = include_str!("style.css");
 
+/// A cause with less of the reducible gap than this is named below, not in the headline.
+const SMALL: f64 = 0.01;
+
+/// The causes that carry the gap, and how many are left out for being small.
+fn main_causes(diagnosis: &Diagnosis) -> (Vec<&Verdict>, usize) {
+    let ranked = words::ranked(diagnosis);
+    let large: Vec<&Verdict> = ranked.iter().copied().filter(|v| words::share(diagnosis, v) >= SMALL).collect();
+    // Without a budget, or where all are small, all count.
+    if large.is_empty() { (ranked, 0) } else { (large.clone(), ranked.len() - large.len()) }
+}
+
 /// The verdict as a headline.
 pub(super) fn headline(diagnosis: &Diagnosis) -> String {
-    let items: Vec<String> = diagnosis.verdict.iter().map(words::item).collect();
-    let text = match items.as_slice() {
+    let (causes, small) = main_causes(diagnosis);
+    let items: Vec<String> = causes.into_iter().map(words::item).collect();
+    let mut text = match items.as_slice() {
         [] => summary::unexplained(diagnosis).to_owned(),
         [one] => format!("Cause: {one}"),
         many => format!("{} causes: {}", many.len(), many.join("; ")),
     };
+    if small > 0 {
+        let _ = write!(text, " (and {small} that carry under 1 % of the gap each)");
+    }
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
@@ -50,9 +65,9 @@ fn advice(diagnosis: &Diagnosis) -> String {
     let first = diagnosis.next.first().map(|e| e.action.as_str());
     let uncertain = diagnosis.verdict.iter().any(|v| matches!(v, Verdict::Group { .. }));
     let unknown = diagnosis.verdict.iter().any(|v| matches!(v, Verdict::Name(n) if n == "unknown"));
-    let fixes: Vec<&str> = diagnosis
-        .verdict
-        .iter()
+    let fixes: Vec<&str> = main_causes(diagnosis)
+        .0
+        .into_iter()
         .filter_map(|v| match v {
             Verdict::Name(name) => words::remedy(name),
             Verdict::Group { .. } => None,

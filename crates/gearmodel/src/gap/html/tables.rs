@@ -27,14 +27,18 @@ fn parameters(effect: &EffectFinding) -> String {
 }
 
 fn closes(shrink: Option<f64>) -> String {
-    shrink.map_or_else(String::new, |s| format!(" · alone it closes {} of the reducible gap", percent(s)))
+    match shrink {
+        None => String::new(),
+        Some(s) if s < 0.005 => " · alone it closes next to nothing of the gap".to_owned(),
+        Some(s) => format!(" · alone it closes {} of the reducible gap", percent(s)),
+    }
 }
 
 /// What the diagnosis stakes its name on, one card each.
 pub fn causes(diagnosis: &Diagnosis) -> String {
     let mut out = String::new();
     let effect = |name: &String| diagnosis.effects.iter().find(|e| e.name == *name);
-    for item in &diagnosis.verdict {
+    for item in words::ranked(diagnosis) {
         let title = escape(&words::item(item));
         // Writing to a String cannot fail.
         match item {
@@ -79,7 +83,7 @@ pub fn causes(diagnosis: &Diagnosis) -> String {
                 let shrink = members.iter().filter_map(effect).filter_map(|e| e.shrink).reduce(f64::max);
                 let _ = write!(
                     out,
-                    "<article class=\"card\"><h3>{title}</h3><p class=\"quiet\">p {} that one of them is there{}</p>\
+                    "<article class=\"card wide\"><h3>{title}</h3><p class=\"quiet\">p {} that one of them is there{}</p>\
                      <p>Do not fix one of them yet: {} (they stand {angle_deg:.1}° apart).</p>",
                     escape(&probability(group_probability(diagnosis, members))),
                     closes(shrink),
@@ -114,7 +118,7 @@ pub fn budget(diagnosis: &Diagnosis) -> String {
             out,
             "<tr><td><span class=\"key k-{}\"></span></td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{interval}</td></tr>",
             part_class(n, &row.effect),
-            escape(words::plain(&row.effect)),
+            escape(&words::within(diagnosis, &row.effect)),
             percent(row.share)
         );
     }
@@ -133,7 +137,8 @@ pub fn probabilities(diagnosis: &Diagnosis) -> String {
         "<table><tr><th>effect</th><th>sits on</th><th>probability</th><th class=\"n\">trace, µrad rms</th>\
          <th class=\"n\">closes alone</th></tr>",
     );
-    let shrink = |e: &EffectFinding| e.shrink.map_or_else(|| "–".to_owned(), percent);
+    // Alone on held-out runs an effect that is not there makes things worse: it closes nothing.
+    let shrink = |e: &EffectFinding| e.shrink.filter(|s| *s > 0.0005).map_or_else(|| "–".to_owned(), percent);
     let mut grouped: Vec<&str> = Vec::new();
     let row = |e: &EffectFinding, class: &str| {
         format!(

@@ -181,13 +181,45 @@ pub fn same_trace(members: &[String], elliptic: bool) -> &'static str {
     }
 }
 
+/// A part of the budget in plain words: where the verdict holds a group, its member stands for all of it.
+#[must_use]
+pub fn within(diagnosis: &Diagnosis, name: &str) -> String {
+    let of =
+        |verdict: &&Verdict| matches!(verdict, Verdict::Group { members, .. } if members.iter().any(|m| m == name));
+    diagnosis.verdict.iter().find(of).map_or_else(|| plain(name).to_owned(), item)
+}
+
+/// Share of the reducible gap that an item of the verdict holds; 0 where there is no budget.
+#[must_use]
+pub fn share(diagnosis: &Diagnosis, verdict: &Verdict) -> f64 {
+    let holds = |name: &str| match verdict {
+        Verdict::Name(own) if own == "unknown" => name.starts_with("unknown"),
+        Verdict::Name(own) => own == name,
+        Verdict::Group { members, .. } => members.iter().any(|m| m == name),
+    };
+    diagnosis.gap.budget.iter().filter(|row| holds(&row.effect)).map(|row| row.share).sum()
+}
+
+/// The verdict, what holds most of the gap first: that is what is worth fixing first.
+#[must_use]
+pub fn ranked(diagnosis: &Diagnosis) -> Vec<&Verdict> {
+    let mut items: Vec<&Verdict> = diagnosis.verdict.iter().collect();
+    items.sort_by(|a, b| share(diagnosis, b).total_cmp(&share(diagnosis, a)));
+    items
+}
+
 /// Where the gap lies, as a sentence, and what that points to.
 #[must_use]
 pub fn location(diagnosis: &Diagnosis) -> String {
-    let signature = &diagnosis.location.signature;
+    let place = &diagnosis.location;
     let several = if diagnosis.verdict.len() > 1 { "largest part " } else { "" };
-    let points = points_to(signature).map(|to| format!("     -> {to}")).unwrap_or_default();
-    format!("{several}{}, {}{points}", carrier(diagnosis), behaviour(signature))
+    let order = match place.signature.carrier {
+        Carrier::Input => leading_order(&place.input_order),
+        Carrier::Output => leading_order(&place.output_order),
+        _ => None,
+    };
+    let points = points_to(&place.signature, order).map(|to| format!("     -> {to}")).unwrap_or_default();
+    format!("{several}{}, {}{points}", carrier(diagnosis), behaviour(&place.signature))
 }
 
 /// Order that stands for most of a list's power, if one does.
@@ -198,7 +230,8 @@ fn leading_order(slices: &[super::super::diagnosis::Slice]) -> Option<i64> {
 
 fn carrier(diagnosis: &Diagnosis) -> String {
     let location = &diagnosis.location;
-    let name = |shaft: &str| match diagnosis.verdict.first() {
+    // With one cause alone the signature is surely its own.
+    let name = |shaft: &str| match diagnosis.verdict.first().filter(|_| diagnosis.verdict.len() == 1) {
         Some(Verdict::Group { members, .. })
             if members.iter().any(|m| m.contains('1') || m.ends_with("input"))
                 && members.iter().any(|m| m.contains('2') || m.ends_with("output")) =>
@@ -254,7 +287,7 @@ pub fn behaviour(signature: &Signature) -> String {
 }
 
 /// Where on the rig such a signature points; `None` where it does not by itself.
-fn points_to(signature: &Signature) -> Option<&'static str> {
+fn points_to(signature: &Signature, order: Option<i64>) -> Option<&'static str> {
     let any = |exponent: Option<f64>| exponent == Some(0.0);
     let grows = |exponent: Option<f64>| exponent.is_some_and(|p| p > 0.0);
     let (load, speed) = (signature.load_exponent, signature.speed_exponent);
@@ -267,9 +300,14 @@ fn points_to(signature: &Signature) -> Option<&'static str> {
         (_, Carrier::EncoderLine, _) => Some("an encoder's electronics, not gears"),
         (_, Carrier::Mesh, _) if any(load) => Some("tooth flanks, not shafts"),
         (_, Carrier::Mesh, _) if grows(load) => Some("teeth that give way under load"),
-        (_, Carrier::Input | Carrier::Output, Parity::Even) if any(load) && any(speed) => {
-            Some("instrument or clocking, not teeth, not drive train")
+        (_, Carrier::Input | Carrier::Output, Parity::OneFlank) if signature.sector_deg.is_some() => {
+            Some("one place of the turn: a tooth, not a shaft")
         }
+        (_, Carrier::Input | Carrier::Output, Parity::Even) if any(load) && any(speed) => Some(match order {
+            Some(1) => "instrument or clocking, not teeth, not drive train",
+            Some(2) => "an encoder's disc or a coupling, not teeth",
+            _ => "something that turns with that shaft; not play, not wind-up",
+        }),
         (_, Carrier::Input | Carrier::Output, Parity::Mixed) if any(load) && any(speed) => {
             Some("gears on their shafts or their centre distance, not encoders")
         }
@@ -308,8 +346,9 @@ mod tests {
     #[test]
     fn accumulation_without_load_never_points_to_elasticity() {
         let row = Signature::steady(Carrier::None, Parity::Even).accumulating(Accumulates::PerRevolution);
-        assert!(points_to(&row).unwrap().contains("not elasticity"));
+        assert!(points_to(&row, None).unwrap().contains("not elasticity"));
+        // One load only: nothing is claimed.
         let unknown = Signature { load_exponent: None, ..row };
-        assert_eq!(points_to(&unknown), None);
+        assert_eq!(points_to(&unknown, None), None);
     }
 }
