@@ -40,6 +40,8 @@ __all__ = [
     "sweep",
     "outline_dxf",
     "outline_svg",
+    "NativeDiagnosis",
+    "diagnose",
 ]
 
 class GeometryError(ValueError): ...

@@ -8,10 +8,10 @@ use crate::Direction;
 use crate::gap::diagnosis::Curve;
 use crate::gap::summary::quantity::{plain, urad};
 
-/// Cells over a turn.
-const CELLS: usize = 120;
+/// Cells over a turn: five a tooth of the common gears, so that teeth do not beat with cells.
+const CELLS: usize = 240;
 /// Most rows of one run; more revolutions are averaged.
-const MOST_ROWS: usize = 12;
+const MOST_ROWS: usize = 8;
 /// Steps of colour on either side of zero.
 const LEVELS: i32 = 6;
 const LEFT: f64 = 150.0;

@@ -56,6 +56,11 @@ fn outcome(diagnosis: &Diagnosis) -> String {
             let _ = write!(text, " (90 % interval {:.1} … {:.1} %)", 100.0 * low, 100.0 * high);
         }
         text.push_str(", on runs that were not used for the fit.");
+        if diagnosis.verdict.iter().any(|v| matches!(v, Verdict::Name(n) if n == "unknown")) {
+            text.push_str(
+                " The part from outside the library is followed there by a pattern that fits it, not explained: see its share in the budget.",
+            );
+        }
     }
     text
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::charts::part_class;
 use super::svg::{Anchor, Svg, escape};
 use crate::gap::diagnosis::{Diagnosis, EffectFinding, Experiment, Verdict};
-use crate::gap::summary::quantity::{parameter, percent, plain, probability, urad};
+use crate::gap::summary::quantity::{parameter, percent, plain, probability, tenth, urad};
 use crate::gap::summary::{group_probability, is_elliptic, words};
 
 /// Effects under this probability are listed by name alone.
@@ -52,12 +52,7 @@ pub fn causes(diagnosis: &Diagnosis) -> String {
                 );
                 match &unknown.location {
                     Some(location) => {
-                        let _ = write!(
-                            out,
-                            "<p>Where: {} — {}.</p>",
-                            escape(&location.description),
-                            escape(&words::behaviour(&location.signature))
-                        );
+                        let _ = write!(out, "<p>Where: {}.</p>", escape(&location.description));
                     }
                     None => out.push_str("<p>It has no pattern of its own over angle, load, speed or time.</p>"),
                 }
@@ -113,7 +108,8 @@ pub fn budget(diagnosis: &Diagnosis) -> String {
         "<table><tr><th></th><th>part</th><th class=\"n\">share</th><th class=\"n\">90 % interval</th></tr>",
     );
     for (n, row) in diagnosis.gap.budget.iter().enumerate() {
-        let interval = row.interval.map_or_else(String::new, |[a, b]| format!("{:.1} … {:.1} %", 100.0 * a, 100.0 * b));
+        let interval =
+            row.interval.map_or_else(String::new, |[a, b]| format!("{} … {} %", tenth(100.0 * a), tenth(100.0 * b)));
         let _ = write!(
             out,
             "<tr><td><span class=\"key k-{}\"></span></td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{interval}</td></tr>",
@@ -128,7 +124,11 @@ pub fn budget(diagnosis: &Diagnosis) -> String {
 
 fn bar(p: f64) -> String {
     let width = 100.0 * p.clamp(0.0, 1.0);
-    format!("<span class=\"meter\"><span style=\"width:{width:.1}%\"></span></span> {}", escape(&probability(p)))
+    let text = probability(p);
+    format!(
+        "<span class=\"row\"><span class=\"meter\"><span style=\"width:{width:.1}%\"></span></span> {}</span>",
+        escape(text.trim_start_matches("= "))
+    )
 }
 
 /// Probability of every effect, groups as one statement.

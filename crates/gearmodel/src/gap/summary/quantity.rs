@@ -133,7 +133,14 @@ pub fn probability(p: f64) -> String {
 /// A share as a percentage.
 #[must_use]
 pub fn percent(share: f64) -> String {
-    format!("{:.1} %", 100.0 * share)
+    format!("{} %", tenth(100.0 * share))
+}
+
+/// A number to a tenth; none is a negative zero.
+#[must_use]
+pub fn tenth(value: f64) -> String {
+    let text = format!("{value:.1}");
+    if text == "-0.0" { "0.0".to_owned() } else { text }
 }
 
 #[cfg(test)]
@@ -174,5 +181,6 @@ mod tests {
         assert_eq!(probability(1.0), "> 0.999");
         assert_eq!(probability(0.0), "< 0.001");
         assert_eq!(probability(0.9981), "= 0.998");
+        assert_eq!(percent(-0.0001), "0.0 %");
     }
 }

@@ -127,6 +127,9 @@ const FAMILIES: &[(&str, &str, &str)] = &[
 /// An effect in plain words; a name outside the library stays as it is.
 #[must_use]
 pub fn plain(name: &str) -> &str {
+    if name == "unknown" {
+        return "something outside the library";
+    }
     EFFECTS.iter().find(|(n, _, _)| *n == name).map_or(name, |(_, words, _)| words)
 }
 
@@ -267,7 +270,7 @@ pub fn behaviour(signature: &Signature) -> String {
     };
     let grows = |quantity: &str, exponent: Option<f64>| match exponent {
         None => format!("{quantity} dependence unknown"),
-        Some(p) if p == 0.0 => format!("any {quantity}"),
+        Some(0.0) => format!("any {quantity}"),
         Some(p) if (p - 1.0).abs() < 1e-9 => format!("growing with the {quantity}"),
         Some(p) => format!("as {quantity}^{p}"),
     };
@@ -292,6 +295,8 @@ fn points_to(signature: &Signature, order: Option<i64>) -> Option<&'static str> 
     let grows = |exponent: Option<f64>| exponent.is_some_and(|p| p > 0.0);
     let (load, speed) = (signature.load_exponent, signature.speed_exponent);
     match (signature.accumulates, signature.carrier, signature.parity) {
+        // Heat opens the centre distance: the senses part. What takes both alike is no matter of the gears.
+        (Accumulates::PerTime, _, Parity::Even) => Some("counting or a mounting that creeps, not gears"),
         (Accumulates::PerTime, _, _) => Some("heat or drift, not teeth"),
         (Accumulates::PerRevolution, _, _) if grows(load) => Some("slip or wear, not elasticity"),
         (Accumulates::PerRevolution, _, _) if any(load) => {
