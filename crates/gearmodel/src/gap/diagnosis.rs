@@ -224,6 +224,12 @@ pub struct Confusability {
 pub struct Curve {
     /// Label.
     pub label: String,
+    /// Sense of the driver.
+    pub direction: crate::Direction,
+    /// Load, N·m.
+    pub load_nm: f64,
+    /// Driver speed, rpm.
+    pub speed_rpm: f64,
     /// θ1 within the turn, rad.
     pub theta1_rad: Vec<f64>,
     /// Mean residual over the revolutions, rad.

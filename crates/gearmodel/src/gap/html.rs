@@ -1,10 +1,9 @@
-//! The report as a page of its own.
+//! The report as a page of its own: works offline, in light and dark, and on paper.
 
-use super::diagnosis::Diagnosis;
+mod charts;
+mod maps;
+mod page;
+mod svg;
+mod tables;
 
-/// A self-contained page: no script or font from elsewhere.
-#[must_use]
-pub fn page(diagnosis: &Diagnosis) -> String {
-    let summary = super::summary::text(diagnosis);
-    format!("<!doctype html><meta charset=\"utf-8\"><title>Gap diagnosis</title><pre>{summary}</pre>")
-}
+pub use page::page;

@@ -235,6 +235,7 @@ pub(super) fn curves(grid: &Grid, pool: &Pool, best: &Fit) -> Vec<Curve> {
         let mut sums = vec![(0.0, 0.0, 0.0); grid.bins];
         let mut map_rad = Vec::new();
         let mut label = String::new();
+        let (mut load_nm, mut speed_rpm) = (0.0, 0.0);
         for revolution in grid.revolutions.iter().filter(|r| r.run == run) {
             let mut row = vec![f64::NAN; grid.bins];
             for place in revolution.places.clone() {
@@ -246,8 +247,9 @@ pub(super) fn curves(grid: &Grid, pool: &Pool, best: &Fit) -> Vec<Curve> {
                 sums[bin].2 += weight;
                 row[bin] = grid.rho_rad[place] - zero;
                 if label.is_empty() {
-                    let rpm = at.speed_rad_per_s.abs() * 60.0 / TAU;
-                    label = format!("{direction} {:.3} N·m {rpm:.3} rpm", at.load_nm);
+                    load_nm = at.load_nm;
+                    speed_rpm = at.speed_rad_per_s.abs() * 60.0 / TAU;
+                    label = format!("{direction} {load_nm:.3} N·m {speed_rpm:.3} rpm");
                 }
             }
             map_rad.push(row);
@@ -255,6 +257,9 @@ pub(super) fn curves(grid: &Grid, pool: &Pool, best: &Fit) -> Vec<Curve> {
         let seen: Vec<usize> = (0..grid.bins).filter(|n| sums[*n].2 > 0.0).collect();
         curves.push(Curve {
             label,
+            direction: *direction,
+            load_nm,
+            speed_rpm,
             theta1_rad: seen.iter().map(|n| (*n as f64 + 0.5) * TAU / grid.bins as f64).collect(),
             before_rad: seen.iter().map(|n| sums[*n].0 / sums[*n].2).collect(),
             after_rad: seen.iter().map(|n| sums[*n].1 / sums[*n].2).collect(),

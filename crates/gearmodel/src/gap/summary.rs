@@ -1,101 +1,38 @@
 //! The summary for the terminal.
 
+pub mod quantity;
+pub mod words;
+
 use std::fmt::Write as _;
 
 use super::diagnosis::{Diagnosis, EffectFinding, Verdict};
-use crate::effect::{Accumulates, Carrier, Parity, Signature};
+use quantity::{percent, probability, urad};
 
-const URAD: f64 = 1e6;
+/// Probability above which an effect outside the verdict is mentioned.
+const MENTIONED: f64 = 0.03;
 
 /// The summary as text.
 #[must_use]
 pub fn text(diagnosis: &Diagnosis) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
-    let gap = &diagnosis.gap;
-    let _ = write!(
-        out,
-        "gap   {:.1} urad rms  ->  {:.1} urad rms   (floor {:.1})",
-        URAD * gap.before_rad,
-        URAD * gap.after_rad,
-        URAD * gap.floor_rad
-    );
-    if let (Some(closed), Some([low, high])) = (gap.closed, gap.closed_interval) {
-        let _ = write!(
-            out,
-            "   {:.1} % of the reducible gap closed [{:.1}, {:.1}], on held-out runs",
-            100.0 * closed,
-            100.0 * low,
-            100.0 * high
-        );
-    }
-    let _ = writeln!(out);
+    let _ = writeln!(out, "gap   {}", gap(diagnosis));
     if diagnosis.verdict.is_empty() {
-        let _ = writeln!(out, "where nothing stands out of what repeats: the nominal model suffices");
+        let _ = writeln!(out, "where {}", unexplained(diagnosis));
     } else {
-        let _ = writeln!(out, "where {}", in_words(&diagnosis.location.signature));
+        let _ = writeln!(out, "where {}", words::location(diagnosis));
     }
-    for item in &diagnosis.verdict {
-        match item {
-            Verdict::Name(name) if name == "unknown" => {
-                let unknown = &diagnosis.unknown;
-                let place = unknown.location.as_ref().map_or("no pattern of its own", |l| l.description.as_str());
-                let _ = writeln!(
-                    out,
-                    "why   something outside the library   p = {:.3}   {:.1} urad rms: {place}",
-                    unknown.probability,
-                    URAD * unknown.rms_rad
-                );
-            }
-            Verdict::Name(name) => {
-                if let Some(effect) = diagnosis.effects.iter().find(|e| e.name == *name) {
-                    let _ = writeln!(
-                        out,
-                        "why   {name} ({})   p = {:.3}{}",
-                        effect.component,
-                        effect.probability,
-                        closes(effect)
-                    );
-                    let _ = writeln!(out, "        {}", parameters(effect));
-                }
-            }
-            Verdict::Group { members, .. } => {
-                let probability =
-                    diagnosis.groups.iter().find(|g| g.members == *members).map_or(0.0, |g| g.probability);
-                let shrink =
-                    diagnosis.effects.iter().find(|e| members.contains(&e.name)).map(closes).unwrap_or_default();
-                let _ = writeln!(
-                    out,
-                    "why   {}   p = {probability:.3}{shrink}   (this data cannot tell which: same trace)",
-                    members.join(" or ")
-                );
-                for effect in diagnosis.effects.iter().filter(|e| members.contains(&e.name)) {
-                    let _ = writeln!(out, "        if {}   {}", effect.name, parameters(effect));
-                }
-            }
-        }
+    for item in words::ranked(diagnosis) {
+        why(&mut out, diagnosis, item);
     }
-    let named: Vec<&String> = diagnosis
-        .verdict
-        .iter()
-        .flat_map(|item| match item {
-            Verdict::Name(name) => vec![name],
-            Verdict::Group { members, .. } => members.iter().collect(),
-        })
-        .collect();
-    let others: Vec<String> = diagnosis
-        .effects
-        .iter()
-        .filter(|e| e.probability > 0.03 && !named.contains(&&e.name))
-        .map(|e| format!("{} p = {:.2}", e.name, e.probability))
-        .collect();
-    let others = if others.is_empty() { "nothing else above p = 0.03".to_owned() } else { others.join(", ") };
-    let _ = writeln!(out, "also  {others}; unknown remainder p = {:.2}", diagnosis.unknown.probability);
+    let _ = writeln!(out, "also  {}", also(diagnosis));
     for experiment in &diagnosis.next {
         let _ = writeln!(
             out,
             "next  {} ({:.0} min): p >= {:.2} expected",
-            experiment.action, experiment.minutes, experiment.expected_probability
+            experiment.action,
+            experiment.minutes.max(1.0),
+            experiment.expected_probability
         );
     }
     for warning in &diagnosis.warnings {
@@ -104,66 +41,128 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     out
 }
 
-fn closes(effect: &EffectFinding) -> String {
-    effect.shrink.map_or_else(String::new, |shrink| format!("   closes {:.1} %", 100.0 * shrink))
+fn gap(diagnosis: &Diagnosis) -> String {
+    let gap = &diagnosis.gap;
+    let mut line = format!(
+        "{} urad rms  ->  {} urad rms   (floor {})",
+        urad(gap.before_rad),
+        urad(gap.after_rad),
+        urad(gap.floor_rad)
+    );
+    if let Some(closed) = gap.closed {
+        let _ = write!(line, "   {} of the reducible gap closed", percent(closed));
+        if let Some([low, high]) = gap.closed_interval {
+            let _ = write!(line, " [{:.1}, {:.1}]", 100.0 * low, 100.0 * high);
+        }
+        line.push_str(", on held-out runs");
+    }
+    line
 }
 
-fn parameters(effect: &EffectFinding) -> String {
-    effect
-        .parameters
-        .iter()
-        .map(|(name, entry)| {
-            let unit = entry["unit"].as_str().unwrap_or_default();
-            let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-            match (entry["value"].as_f64(), entry["std"].as_f64()) {
-                (Some(value), Some(std)) if std > 0.0 => format!("{name} = {value:.4e} +- {std:.1e}{unit}"),
-                (Some(value), _) => format!("{name} = {value}{unit}"),
-                _ => match entry["value"].as_array() {
-                    Some(values) => {
-                        let peak =
-                            values.iter().filter_map(serde_json::Value::as_f64).fold(0.0_f64, |m, x| m.max(x.abs()));
-                        format!("{name}: {} values up to {peak:.2e}{unit}", values.len())
-                    }
-                    None => format!("{name} = {}", entry["value"].as_str().unwrap_or("?")),
-                },
-            }
-        })
-        .collect::<Vec<_>>()
-        .join(", ")
-}
-
-/// A signature as a sentence.
+/// What to say where nothing is named.
 #[must_use]
-pub fn in_words(signature: &Signature) -> String {
-    let carrier = match signature.carrier {
-        Carrier::Input => "with the driver's angle",
-        Carrier::Output => "with the driven shaft's angle",
-        Carrier::Mesh => "with the tooth mesh",
-        Carrier::EncoderLine => "with an encoder's line period",
-        Carrier::Time => "with time",
-        Carrier::None => "tied to no angle",
+pub fn unexplained(diagnosis: &Diagnosis) -> &'static str {
+    let gap = &diagnosis.gap;
+    if gap.before_rad <= 1.15 * gap.floor_rad {
+        "nothing stands out of what repeats: the nominal model suffices"
+    } else {
+        "a gap is there, but no cause is sure enough to be named"
+    }
+}
+
+fn why(out: &mut String, diagnosis: &Diagnosis, item: &Verdict) {
+    let words = words::item(item);
+    let effect = |name: &String| diagnosis.effects.iter().find(|e| e.name == *name);
+    match item {
+        Verdict::Name(name) if name == "unknown" => {
+            let unknown = &diagnosis.unknown;
+            let place = unknown.location.as_ref().map_or("no pattern of its own", |l| l.description.as_str());
+            let _ = writeln!(
+                out,
+                "why   {words}   p {}   {} urad rms: {place}",
+                probability(unknown.probability),
+                urad(unknown.rms_rad)
+            );
+        }
+        Verdict::Name(name) => {
+            if let Some(effect) = effect(name) {
+                let _ = writeln!(out, "why   {words}   p {}{}", probability(effect.probability), closes(effect.shrink));
+                let _ = writeln!(out, "        {}   {}", effect.name, parameters(effect));
+            }
+        }
+        Verdict::Group { members, .. } => {
+            let shrink = members.iter().filter_map(effect).filter_map(|e| e.shrink).reduce(f64::max);
+            let _ = writeln!(
+                out,
+                "why   {words}   p {}{}      ({})",
+                probability(group_probability(diagnosis, members)),
+                closes(shrink),
+                words::same_trace(members, is_elliptic(diagnosis))
+            );
+            for effect in diagnosis.effects.iter().filter(|e| members.contains(&e.name)) {
+                let _ = writeln!(out, "        if {}   {}", effect.name, parameters(effect));
+            }
+        }
+    }
+}
+
+/// Probability that one of a group is there.
+#[must_use]
+pub fn group_probability(diagnosis: &Diagnosis, members: &[String]) -> f64 {
+    diagnosis.groups.iter().find(|g| g.members == *members).map_or(0.0, |g| g.probability)
+}
+
+/// True where the pair is elliptic: then first orders of both shafts leave one trace.
+#[must_use]
+pub fn is_elliptic(diagnosis: &Diagnosis) -> bool {
+    diagnosis.found.rig.as_ref().is_some_and(|rig| rig.eccentricity().is_some_and(|k| k > 0.0))
+}
+
+/// Names that the verdict holds, members of groups included.
+#[must_use]
+pub fn named(diagnosis: &Diagnosis) -> Vec<&str> {
+    let names = |item: &'_ Verdict| match item {
+        Verdict::Name(name) => vec![name.clone()],
+        Verdict::Group { members, .. } => members.clone(),
     };
-    let parity = match signature.parity {
-        Parity::Even => "both senses alike",
-        Parity::Odd => "opposite in the two senses",
-        Parity::Mixed => "alike and opposite parts",
-        Parity::OneFlank => "one flank only",
+    let names: Vec<String> = diagnosis.verdict.iter().flat_map(names).collect();
+    diagnosis.effects.iter().map(|e| e.name.as_str()).filter(|n| names.iter().any(|m| m == n)).collect()
+}
+
+fn also(diagnosis: &Diagnosis) -> String {
+    let named = named(diagnosis);
+    let mut others: Vec<String> = Vec::new();
+    let grouped = |name: &str| diagnosis.groups.iter().find(|g| g.members.iter().any(|m| m == name));
+    let mut told: Vec<&[String]> = Vec::new();
+    for effect in diagnosis.effects.iter().filter(|e| e.probability > MENTIONED && !named.contains(&e.name.as_str())) {
+        match grouped(&effect.name) {
+            Some(group) if told.contains(&group.members.as_slice()) => {}
+            Some(group) => {
+                told.push(&group.members);
+                others.push(format!("{} p {}", words::group(&group.members), probability(group.probability)));
+            }
+            None => others.push(format!("{} p {}", words::plain(&effect.name), probability(effect.probability))),
+        }
+    }
+    let others = if others.is_empty() {
+        format!("nothing{} above p = {MENTIONED}", if named.is_empty() { "" } else { " else" })
+    } else {
+        others.join("; ")
     };
-    let grows = |quantity: &str, exponent: Option<f64>| match exponent {
-        None => format!("{quantity} unknown"),
-        Some(0.0) => format!("any {quantity}"),
-        Some(p) => format!("as {quantity}^{p}"),
-    };
-    let accumulates = match signature.accumulates {
-        Accumulates::No => "not accumulating",
-        Accumulates::PerRevolution => "accumulating with every revolution",
-        Accumulates::PerTime => "growing with time",
-    };
-    let sector =
-        signature.sector_deg.map_or_else(String::new, |[from, to]| format!(", theta1 from {from:.1} to {to:.1} deg"));
-    format!(
-        "{carrier}, {parity}, {}, {}, {accumulates}{sector}",
-        grows("load", signature.load_exponent),
-        grows("speed", signature.speed_exponent)
-    )
+    let unknown = diagnosis.verdict.iter().any(|v| matches!(v, Verdict::Name(name) if name == "unknown"));
+    if unknown { others } else { format!("{others}; unknown remainder p = {:.2}", diagnosis.unknown.probability) }
+}
+
+fn closes(shrink: Option<f64>) -> String {
+    match shrink {
+        None => String::new(),
+        Some(shrink) if shrink < 0.005 => "   closes next to nothing".to_owned(),
+        Some(shrink) => format!("   closes {}", percent(shrink)),
+    }
+}
+
+/// Parameters with their standard deviations, one after the other.
+#[must_use]
+pub fn parameters(effect: &EffectFinding) -> String {
+    effect.parameters.iter().map(|(name, entry)| quantity::parameter(name, entry)).collect::<Vec<_>>().join(", ")
 }

@@ -13,7 +13,7 @@ TE_cw - TE_ccw at equal theta1.
 
 from . import cluster
 from ._analysis import Floor, OrderSpectrum, Spectra, SynchronousAverage, Waves, WaveSplit
-from ._diagnosis import CalibratedModel, Diagnosis, diagnose
+from ._diagnosis import CalibratedModel, Diagnosis, Section, diagnose
 from ._native import (
     Analysis,
     Errors,
@@ -57,6 +57,7 @@ __all__ = [
     "Phases",
     "Profile",
     "Recording",
+    "Section",
     "Spectra",
     "SweepTable",
     "SynchronousAverage",

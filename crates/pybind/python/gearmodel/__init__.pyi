@@ -7,6 +7,7 @@ from ._analysis import (
     Waves as Waves,
     WaveSplit as WaveSplit,
 )
+from ._diagnosis import CalibratedModel as CalibratedModel, Diagnosis as Diagnosis, Section as Section, diagnose as diagnose
 from ._native import (
     Analysis as Analysis,
     Errors as Errors,
@@ -33,6 +34,8 @@ from ._study import SweepTable as SweepTable, Tolerance as Tolerance, ToleranceF
 
 __all__ = [
     "Analysis",
+    "CalibratedModel",
+    "Diagnosis",
     "Errors",
     "Event",
     "Floor",
@@ -48,6 +51,7 @@ __all__ = [
     "Phases",
     "Profile",
     "Recording",
+    "Section",
     "Spectra",
     "SweepTable",
     "SynchronousAverage",
@@ -60,6 +64,7 @@ __all__ = [
     "analyse",
     "backlash_from",
     "cluster",
+    "diagnose",
     "read_log",
     "sweep",
 ]

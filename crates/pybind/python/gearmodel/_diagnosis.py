@@ -29,7 +29,7 @@ def _section(value: Any) -> Any:
 
 
 class CalibratedModel:
-    """The nominal model with the found effects: predicts TE where nothing was measured."""
+    """The nominal model with the found effects: predicts TE where nothing was measured; of a group, with its likeliest member."""
 
     def __init__(self, native: _native.NativeDiagnosis) -> None:
         self._native = native
@@ -55,6 +55,9 @@ class CalibratedModel:
             time_s: time since the campaign's start, s, for effects that grow with it.
             revolutions: driver revolutions since then.
             interval: True returns (te, low, high), the 90 % interval of the found effects' amplitudes.
+
+        Raises:
+            ValueError: direction is neither "ccw" nor "cw", or an angle is not a number.
         """
         te, std = self._native.predict(
             theta1, direction=direction, load_nm=load_nm, speed_rpm=speed_rpm, time_s=time_s, revolutions=revolutions
@@ -65,20 +68,81 @@ class CalibratedModel:
 
 
 class Diagnosis:
-    """What :func:`diagnose` found. Fields: gap, where, effects, groups, unknown, verdict, next, warnings, confusability."""
+    """What :func:`diagnose` found; its ``repr`` is the summary for people.
+
+    Every field is plain data: numbers, text, lists, and dicts whose keys are attributes too (``d.gap.before_rad``).
+    """
 
     def __init__(self, native: _native.NativeDiagnosis) -> None:
         self._native = native
         self._fields: dict[str, Any] = json.loads(native.to_json())
 
-    def __getattr__(self, name: str) -> Any:
-        fields = self.__dict__.get("_fields", {})
-        if name in fields:
-            return _section(fields[name])
-        raise AttributeError(f"a diagnosis has no field {name!r}: there are {', '.join(fields)}")
+    @property
+    def gap(self) -> Section:
+        """How large the gap is and how far it shrinks, on runs that were not used for the fit.
 
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._fields]
+        before_rad, after_rad, floor_rad: RMS of a sample's residual, rad; closed: (before² - after²)/(before² - floor²), None
+        where nothing is reducible; closed_interval: its 90 % interval; budget: list of (effect, share, interval).
+        """
+        return _section(self._fields["gap"])  # type: ignore[no-any-return]
+
+    @property
+    def where(self) -> Section:
+        """Where it lies: lists of (at, rad, floor_rad), and the signature.
+
+        input_angle, driven_angle (at in deg), tooth, input_order, output_order, mesh_order (amplitudes), line_phase, direction,
+        load (N m), speed (rpm), revolution, time (s); signature: carrier, parity, load_exponent, speed_exponent, accumulates,
+        sector_deg.
+        """
+        return _section(self._fields["where"])  # type: ignore[no-any-return]
+
+    @property
+    def effects(self) -> list[Section]:
+        """Every applicable effect, most probable first.
+
+        name, probability, parameters {name: (value, std, unit)}, shrink (share of the reducible gap that it closes alone, or
+        None), component, confused_with (names), rms_rad (its trace).
+        """
+        return _section(self._fields["effects"])  # type: ignore[no-any-return]
+
+    @property
+    def groups(self) -> list[Section]:
+        """Sets of effects that this data cannot tell apart: members (names), angle_deg, probability of one of them."""
+        return _section(self._fields["groups"])  # type: ignore[no-any-return]
+
+    @property
+    def unknown(self) -> Section:
+        """What lies outside the library: probability, rms_rad, where (description and signature, or None)."""
+        return _section(self._fields["unknown"])  # type: ignore[no-any-return]
+
+    @property
+    def verdict(self) -> list[Any]:
+        """What the diagnosis would stake its name on: names, groups as (members, angle_deg), and "unknown"."""
+        return _section(self._fields["verdict"])  # type: ignore[no-any-return]
+
+    @property
+    def next(self) -> list[Section]:
+        """Up to three experiments: action, separates (names), expected_probability, minutes, plan (rows), toml."""
+        return _section(self._fields["next"])  # type: ignore[no-any-return]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the data does not allow one to conclude, in plain words."""
+        return list(self._fields["warnings"])
+
+    @property
+    def confusability(self) -> Section:
+        """Angles between effects under this plan: names, angle_deg (a square table)."""
+        return _section(self._fields["confusability"])  # type: ignore[no-any-return]
+
+    @property
+    def curves(self) -> list[dict[str, Any]]:
+        """Mean residual of every run over the driver's turn, before and after.
+
+        A dict a run: label, theta1_rad, before_rad, after_rad; 1-D arrays of equal length, rad.
+        """
+        names = ("label", "theta1_rad", "before_rad", "after_rad")
+        return [dict(zip(names, curve, strict=True)) for curve in self._native.curves()]
 
     @property
     def model(self) -> CalibratedModel:
@@ -86,7 +150,7 @@ class Diagnosis:
         return CalibratedModel(self._native)
 
     def to_dict(self) -> dict[str, Any]:
-        """All fields in plain JSON types."""
+        """All fields in plain JSON types; what is not finite is None."""
         fields: dict[str, Any] = json.loads(self._native.to_json())
         return fields
 
@@ -95,12 +159,20 @@ class Diagnosis:
         return json.dumps(self._fields, **options)
 
     def to_html(self, path: str | os.PathLike[str]) -> None:
-        """Writes the report as a page that needs nothing else."""
+        """Writes the report as a page that needs nothing else.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
         with open(path, "w", encoding="utf-8") as file:
             file.write(self._native.to_html())
 
     def plot(self) -> Any:
-        """The residual of each run before and after, and the probabilities: a matplotlib figure."""
+        """The gap, the probabilities, where it lies, and each run before and after: a matplotlib figure.
+
+        Raises:
+            ImportError: matplotlib is not installed.
+        """
         from ._plot import diagnosis
 
         return diagnosis(self)

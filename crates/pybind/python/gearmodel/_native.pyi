@@ -40,6 +40,8 @@ __all__ = [
     "sweep",
     "outline_dxf",
     "outline_svg",
+    "NativeDiagnosis",
+    "diagnose",
 ]
 
 class GeometryError(ValueError): ...
@@ -594,3 +596,23 @@ class MeasuredBacklash:
     def plot(self) -> Any: ...
 
 def backlash_from(ccw: Recording, cw: Recording, pair: GearPair, *, bins: int = 720) -> MeasuredBacklash: ...
+@final
+class NativeDiagnosis:
+    def to_json(self) -> str: ...
+    def to_html(self) -> str: ...
+    def summary(self) -> str: ...
+    def curves(self) -> list[tuple[str, _Array, _Array, _Array]]: ...
+    def predict(
+        self,
+        theta1: ArrayLike,
+        *,
+        direction: str,
+        load_nm: float,
+        speed_rpm: float,
+        time_s: float,
+        revolutions: float,
+    ) -> tuple[Any, Any]: ...
+
+def diagnose(
+    recordings: Sequence[Recording], pair: GearPair, known: Sequence[str], exclude: Sequence[str]
+) -> NativeDiagnosis: ...
