@@ -86,4 +86,6 @@ pub struct Plan {
     pub runs: usize,
     /// Revolutions of the driver in all.
     pub revolutions: f64,
+    /// Part of its turn that each shaft covers, at most 1: input, output.
+    pub turns: [f64; 2],
 }

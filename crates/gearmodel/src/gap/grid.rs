@@ -130,6 +130,15 @@ impl Grid {
         grid.plan.loads_nm = loads_nm;
         grid.plan.speeds_rad_per_s = levels(speeds.into_iter());
         grid.plan.duration_s = end_s - start_s;
+        grid.plan.turns =
+            [|at: &Station| at.theta1_rad, |at: &Station| at.theta2_rad].map(|angle: fn(&Station) -> f64| {
+                let (low, high) = grid
+                    .places
+                    .iter()
+                    .map(angle)
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+                ((high - low) / TAU).clamp(0.0, 1.0)
+            });
         grid
     }
 

@@ -9,6 +9,12 @@ use crate::gap::shrink::{HeldOut, Selection};
 
 /// Flattens what the noise model's own error makes too sure; calibrated on simulated campaigns.
 const SHARPNESS: f64 = 0.85;
+/// Members of a group nearer than this have one and the same trace, deg.
+const IDENTICAL_DEG: f64 = 0.2;
+/// A sum of two effects nearer than this to a third looks like it, deg.
+const MIMIC_DEG: f64 = 4.0;
+/// Most warnings of such sums.
+const MOST_MIMICS: usize = 5;
 /// Probability of a tone that was found over all frequencies.
 const TONE_PROBABILITY: f64 = 0.99;
 /// Prior odds of a sub-divisional error.
@@ -18,6 +24,13 @@ const INEXACT: f64 = 0.05;
 
 /// Largest probability of what may be no more than that.
 const INEXACT_PROBABILITY: f64 = 0.2;
+
+/// What is named, and groups whose members have one and the same trace with the probability that one of them is there.
+struct Named {
+    groups: Vec<Group>,
+    verdict: Vec<Verdict>,
+    identical: Vec<(Vec<usize>, f64)>,
+}
 
 /// What is known of one effect.
 struct Finding {
@@ -82,7 +95,13 @@ impl Engine<'_> {
         }
         findings.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.number.cmp(&b.number)));
 
-        let (groups, verdict) = self.verdict(&findings, &attribution, best, total_rad);
+        let Named { groups, verdict, identical } = self.verdict(&findings, &attribution, best, total_rad);
+        // Which of the same traces the search met first says nothing: they are equally probable.
+        for (members, probability) in identical {
+            for finding in findings.iter_mut().filter(|f| members.contains(&f.number)) {
+                finding.probability = probability / members.len() as f64;
+            }
+        }
         let unknown = self.unknown(&attribution, best);
         let mut verdict = verdict;
         if unknown.probability > NAMED {
@@ -286,13 +305,8 @@ impl Engine<'_> {
     }
 
     /// Groups and what is named.
-    fn verdict(
-        &self,
-        findings: &[Finding],
-        attribution: &Attribution,
-        best: &Model,
-        total_rad: f64,
-    ) -> (Vec<Group>, Vec<Verdict>) {
+    fn verdict(&self, findings: &[Finding], attribution: &Attribution, best: &Model, total_rad: f64) -> Named {
+        let mut identical = Vec::new();
         let mut groups = Vec::new();
         let mut verdict = Vec::new();
         let mut done: Vec<usize> = Vec::new();
@@ -333,6 +347,9 @@ impl Engine<'_> {
                 }
                 let angle_deg = finding.twins.iter().map(|(_, a)| *a).fold(0.0, f64::max);
                 let names: Vec<String> = members.iter().map(|n| LIBRARY[*n].name().to_owned()).collect();
+                if angle_deg < IDENTICAL_DEG {
+                    identical.push((members.clone(), probability));
+                }
                 groups.push(Group { members: names.clone(), angle_deg, probability });
                 done.extend(&members);
                 if probability > NAMED && in_best {
@@ -343,7 +360,7 @@ impl Engine<'_> {
                 verdict.push(Verdict::Name(LIBRARY[finding.number].name().to_owned()));
             }
         }
-        (groups, verdict)
+        Named { groups, verdict, identical }
     }
 
     fn unknown(&self, attribution: &Attribution, best: &Model) -> Unknown {
@@ -487,7 +504,12 @@ impl Engine<'_> {
                     if self.pool.blocks[x].width() + self.pool.blocks[y].width() > 8 {
                         continue;
                     }
-                    if self.angle_to_sum_deg(block, x, y) < 4.0 {
+                    // Where one alone looks like it, or both are one group, the sum says nothing new.
+                    let near = |m: usize, n: usize| attribute::angle_deg(&self.pool, &self.whitened, m, n) < MIMIC_DEG;
+                    if near(block, x) || near(block, y) || near(x, y) || warnings.len() >= MOST_MIMICS {
+                        continue;
+                    }
+                    if self.angle_to_sum_deg(block, x, y) < MIMIC_DEG {
                         warnings.push(format!(
                             "{} + {} together can look like {} under this plan: their sum stands under 4 deg from it",
                             LIBRARY[a.number].name(),

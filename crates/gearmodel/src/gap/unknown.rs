@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 
 use crate::effect::{Accumulates, Carrier, Parity, Plan, Shaft, Signature, Station};
 
+/// Part of its turn that a shaft must cover for its orders to be tried.
+const LEAST_TURN: f64 = 0.9;
 /// Highest order of waves that do not close with the turn.
 const HIGHEST_WANDERING: f64 = 3.5;
 
@@ -79,6 +81,13 @@ impl Pattern {
         let mut patterns = Vec::new();
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
         let both = plan.senses == [true, true];
+        // Orders of a shaft that hardly turns are not orders but bent lines.
+        let shafts: Vec<Shaft> = [Shaft::Input, Shaft::Output]
+            .into_iter()
+            .zip(plan.turns)
+            .filter(|(_, turns)| *turns > LEAST_TURN)
+            .map(|(shaft, _)| shaft)
+            .collect();
         let parities: &[bool] = if both { &[false, true] } else { &[false] };
         let mut weights = vec![(Weight::One, 1.0)];
         if plan.loads_nm.len() > 1 {
@@ -95,7 +104,7 @@ impl Pattern {
                 if weight != Weight::One {
                     patterns.push(Self::Level { odd, weight, mean });
                 }
-                for shaft in [Shaft::Input, Shaft::Output] {
+                for &shaft in &shafts {
                     for order in 1..=8 {
                         patterns.push(Self::Order { shaft, order: f64::from(order), odd, weight, mean });
                     }
@@ -105,7 +114,7 @@ impl Pattern {
         if both {
             patterns.push(Self::Level { odd: true, weight: Weight::One, mean: 1.0 });
             for sense in [1.0, -1.0] {
-                for shaft in [Shaft::Input, Shaft::Output] {
+                for &shaft in &shafts {
                     for order in 1..=4 {
                         patterns.push(Self::OneSense { shaft, order, sense });
                     }
