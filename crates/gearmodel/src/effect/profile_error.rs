@@ -3,12 +3,17 @@
 
 use std::f64::consts::TAU;
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect, StatedError, Station};
 
 /// Profile deviation by mesh orders.
 pub(super) struct ProfileError;
 
 const ORDERS: usize = 3;
+/// Parameters that a file may state: both flanks, or those driving ccw, then those driving cw.
+const STATED: [&str; 4 * ORDERS] = [
+    "a1_mm", "ph1_rad", "a2_mm", "ph2_rad", "a3_mm", "ph3_rad", "a1_cw_mm", "ph1_cw_rad", "a2_cw_mm", "ph2_cw_rad", "a3_cw_mm",
+    "ph3_cw_rad",
+];
 const NAMES: [[&str; 2]; ORDERS] = [["a1_mm", "ph1_rad"], ["a2_mm", "ph2_rad"], ["a3_mm", "ph3_rad"]];
 
 impl Effect for ProfileError {
@@ -53,5 +58,30 @@ impl Effect for ProfileError {
                 ]
             })
             .collect()
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &STATED
+    }
+
+    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        let both = !STATED[2 * ORDERS..].iter().any(|name| given.has(name));
+        let waves = if both { ORDERS } else { 2 * ORDERS };
+        let mut beta = Vec::with_capacity(2 * waves);
+        for pair in STATED[..2 * waves].chunks_exact(2) {
+            // a cos(x − φ) = a sin φ sin x + a cos φ cos x.
+            let (a_mm, phase_rad) = (given.number_or(pair[0], 0.0)?, given.number_or(pair[1], 0.0)?);
+            beta.extend([a_mm * phase_rad.sin(), a_mm * phase_rad.cos()]);
+        }
+        Ok((vec![if both { 0.0 } else { 1.0 }], beta))
+    }
+
+    fn stated(&self, _rig: &Rig, _shape: &Shape, beta: &[f64]) -> StatedEffect {
+        let mut stated = StatedEffect::new();
+        for (pair, wave) in STATED.chunks_exact(2).zip(beta.chunks_exact(2)) {
+            stated.insert(pair[0].to_owned(), Stated::Number(wave[0].hypot(wave[1])));
+            stated.insert(pair[1].to_owned(), Stated::Number(wave[0].atan2(wave[1])));
+        }
+        stated
     }
 }

@@ -4,7 +4,10 @@
 
 use std::f64::consts::TAU;
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect, StatedError, Station, stated};
+
+/// What excites it, as a file states it: kind 1, then kind 0.
+const EXCITED_BY: [&str; 2] = ["mesh", "turn"];
 
 /// Torsional resonance of the drive train.
 pub(super) struct TorsionalResonance;
@@ -87,5 +90,22 @@ impl Effect for TorsionalResonance {
         let mut parameters = vec![Parameter::grid("f_hz", shape[1], "Hz"), Parameter::grid("zeta", shape[2], "")];
         parameters.extend(found.polar(0).parameters("excitation_rad", "rad"));
         parameters
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["f_hz", "zeta", "excitation_rad", "phase_rad", "excited_by"]
+    }
+
+    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        let kind = if given.word("excited_by", &EXCITED_BY, true)? == 0 { 1.0 } else { 0.0 };
+        let shape = vec![kind, given.number_in("f_hz", 1e-6, 1e9)?, given.number_in("zeta", 1e-6, 10.0)?];
+        Ok((shape, given.polar("excitation_rad")?))
+    }
+
+    fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+        let mut stated = stated::by_parameters(self, rig, shape, beta);
+        let word = EXCITED_BY[usize::from(shape.first() != Some(&1.0))];
+        stated.insert("excited_by".to_owned(), Stated::Text(word.to_owned()));
+        stated
     }
 }

@@ -193,6 +193,8 @@ class GearPair:
     def closure(self) -> float: ...
     @property
     def errors(self) -> Errors: ...
+    @property
+    def effects(self) -> list[str]: ...
     def with_errors(self, errors: Errors) -> GearPair: ...
     @overload
     def theta2(self, theta1: _Scalar) -> float: ...
@@ -230,6 +232,9 @@ class GearPair:
         *,
         tooth_errors: ToothErrors | None = None,
         displacement_mm: tuple[float, float] | None = None,
+        speed_rpm: float = 0.0,
+        time_s: float = 0.0,
+        revolutions: float = 0.0,
     ) -> float: ...
     @overload
     def transmission_error(
@@ -243,6 +248,9 @@ class GearPair:
         *,
         tooth_errors: ToothErrors | None = None,
         displacement_mm: tuple[float, float] | None = None,
+        speed_rpm: float = 0.0,
+        time_s: float = 0.0,
+        revolutions: float = 0.0,
     ) -> _Array: ...
     @overload
     def backlash(
