@@ -91,6 +91,13 @@ impl NominalModel {
     /// Predicted backlash at θ1 under load, rad at the driven shaft: TE_cw − TE_ccw.
     #[must_use]
     pub fn backlash_rad(&self, theta1_rad: f64, load_nm: f64) -> f64 {
-        self.te_rad(theta1_rad, Direction::Cw, load_nm) - self.te_rad(theta1_rad, Direction::Ccw, load_nm)
+        self.backlash_under_rad(theta1_rad, &Condition::at_rest(Direction::Ccw, load_nm))
+    }
+
+    /// The same where speed, time and revolutions matter too; the sense of `under` does not.
+    #[must_use]
+    pub fn backlash_under_rad(&self, theta1_rad: f64, under: &Condition) -> f64 {
+        let te_rad = |direction| self.te_under_rad(theta1_rad, &Condition { direction, ..*under });
+        te_rad(Direction::Cw) - te_rad(Direction::Ccw)
     }
 }

@@ -47,10 +47,11 @@ pub struct Verified {
     pub floor_rms_rad: Option<f64>,
 }
 
-/// Sums of squares, by points.
+/// Sums of squares over cells: angle bins, revolution by revolution. Residual and scatter are of the same cells, so that a model
+/// without error has a ratio of 1.
 #[derive(Clone, Copy, Default)]
 struct Sums {
-    points: f64,
+    cells: f64,
     sum: f64,
     squares: f64,
     /// Squared deviations between revolutions, and their degrees of freedom.
@@ -65,10 +66,13 @@ impl Sums {
         let mut sums = Self::default();
         let mut bins = vec![(0.0, 0.0, 0.0); BINS];
         let mut turn = (0, vec![(0.0, 0.0); BINS]);
-        let mut close = |turn: &mut Vec<(f64, f64)>| {
+        let mut close = |turn: &mut Vec<(f64, f64)>, sums: &mut Self| {
             for (bin, cell) in bins.iter_mut().zip(turn) {
                 if cell.0 > 0.0 {
                     let mean: f64 = cell.1 / cell.0;
+                    sums.cells += 1.0;
+                    sums.sum += mean;
+                    sums.squares += mean * mean;
                     bin.0 += 1.0;
                     bin.1 += mean;
                     bin.2 += mean * mean;
@@ -78,19 +82,16 @@ impl Sums {
         };
         for point in &run.points {
             let rho = point.rho_rad - zero_rad;
-            sums.points += 1.0;
-            sums.sum += rho;
-            sums.squares += rho * rho;
             let way_rev = (point.theta1_rad - first.theta1_rad).abs() / TAU;
             sums.revolutions = way_rev;
             if way_rev as usize != turn.0 {
-                close(&mut turn.1);
+                close(&mut turn.1, &mut sums);
                 turn.0 = way_rev as usize;
             }
             let cell = &mut turn.1[((way_rev.fract() * BINS as f64) as usize).min(BINS - 1)];
             *cell = (cell.0 + 1.0, cell.1 + rho);
         }
-        close(&mut turn.1);
+        close(&mut turn.1, &mut sums);
         for (n, sum, squares) in bins {
             if n > 1.0 {
                 sums.scatter += (squares - sum * sum / n).max(0.0);
@@ -101,7 +102,7 @@ impl Sums {
     }
 
     fn add(&mut self, other: &Self) {
-        self.points += other.points;
+        self.cells += other.cells;
         self.sum += other.sum;
         self.squares += other.squares;
         self.scatter += other.scatter;
@@ -114,7 +115,7 @@ impl Sums {
     }
 
     fn residual_rms_rad(&self) -> f64 {
-        (self.squares / self.points.max(1.0)).sqrt()
+        (self.squares / self.cells.max(1.0)).sqrt()
     }
 
     fn row(&self, direction: String, load_nm: Option<f64>, speed_rpm: Option<f64>) -> VerifiedRow {
@@ -124,7 +125,7 @@ impl Sums {
             load_nm,
             speed_rpm,
             revolutions: self.revolutions,
-            mean_rad: self.sum / self.points.max(1.0),
+            mean_rad: self.sum / self.cells.max(1.0),
             residual_rms_rad: self.residual_rms_rad(),
             floor_rms_rad,
             ratio: floor_rms_rad.filter(|floor| *floor > 0.0).map(|floor| self.residual_rms_rad() / floor),
