@@ -60,7 +60,8 @@ impl NominalModel {
     /// Predicted TE at θ1 where speed, time and revolutions matter too, rad.
     #[must_use]
     pub fn te_under_rad(&self, theta1_rad: f64, under: &Condition) -> f64 {
-        self.te_at_rad(&self.pair.at(theta1_rad), under.direction, under.load_nm) + self.effects_te_rad(theta1_rad, under)
+        self.te_at_rad(&self.pair.at(theta1_rad), under.direction, under.load_nm)
+            + self.effects_te_rad(theta1_rad, under)
     }
 
     /// What the documented effects add to the errors' TE, rad.

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
 
-use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::Deserialize;
+use serde::de::{self, Deserializer, MapAccess, Visitor};
 
 use super::PairFile;
 use crate::effect::{LIBRARY, Stated, StatedEffect, Term, by_name};
@@ -276,7 +276,8 @@ mod tests {
         assert!(said.contains("time_skew is no table"), "{said}");
         let said = refused("[documented.slip]\nk_rad_per_rev_nm = 1e-6\nt0_nm = -1\n");
         assert!(said.contains("`t0_nm` = -1 is outside 0"), "{said}");
-        let constant = PairFile::parse("kind = \"constant\"\nratio = 3\n[documented.centre_distance_error]\nda_mm = 0.1\n");
+        let constant =
+            PairFile::parse("kind = \"constant\"\nratio = 3\n[documented.centre_distance_error]\nda_mm = 0.1\n");
         assert!(constant.unwrap().model().unwrap_err().to_string().contains("needs teeth"));
     }
 

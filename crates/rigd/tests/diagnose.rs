@@ -23,7 +23,8 @@ fn text(path: &Path) -> &str {
 
 /// Runs the simulated rig; the log.
 fn run(directory: &Path, extra: &[&str]) -> PathBuf {
-    let usual = ["run", "--load", "2Nm,10Nm", "--rpm", "12", "--revs", "4", "--rate", "1kHz", "--json", "--quiet", "--out"];
+    let usual =
+        ["run", "--load", "2Nm,10Nm", "--rpm", "12", "--revs", "4", "--rate", "1kHz", "--json", "--quiet", "--out"];
     let output = rigd(&[&usual[..], &[text(directory)], extra].concat());
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     let summary: Value = serde_json::from_slice(&output.stdout).expect("one object");
@@ -50,7 +51,9 @@ fn diagnosed(arguments: &[&str]) -> Value {
 fn named(diagnosis: &Value) -> Vec<String> {
     let item = |item: &Value| match item {
         Value::String(name) => vec![name.clone()],
-        group => group["members"].as_array().expect("members").iter().map(|m| m.as_str().expect("a name").into()).collect(),
+        group => {
+            group["members"].as_array().expect("members").iter().map(|m| m.as_str().expect("a name").into()).collect()
+        }
     };
     diagnosis["verdict"].as_array().expect("a verdict").iter().flat_map(item).collect()
 }
@@ -151,7 +154,11 @@ fn a_written_model_explains_a_fresh_run_and_the_old_one_does_not() {
     // The fresh log carries the model that it was run with.
     for extra in [&[][..], &["--model", text(&model)]] {
         let (code, object) = verified(extra);
-        assert_eq!((code, &object["passed"], &object["schema"]), (Some(0), &true.into(), &"rigd.verify/1".into()), "{object}");
+        assert_eq!(
+            (code, &object["passed"], &object["schema"]),
+            (Some(0), &true.into(), &"rigd.verify/1".into()),
+            "{object}"
+        );
         assert_eq!(object["runs"].as_array().map(Vec::len), Some(4));
     }
     let old = directory.path().join("old.toml");
@@ -185,7 +192,10 @@ fn an_effect_that_depends_on_speed_is_documented_as_a_table() {
     assert!(named(&half).contains(&"time_skew".to_owned()), "{}", half["verdict"]);
     let file = gearmodel::PairFile::parse(&std::fs::read_to_string(&model).expect("a model")).expect("a pair");
     let [table] = &file.effects["time_skew"][..] else { panic!("one table, not {:?}", file.effects) };
-    assert!(matches!(table["dt_s"], gearmodel::effect::Stated::Number(dt_s) if (dt_s - 6e-5).abs() < 2e-6), "{table:?}");
+    assert!(
+        matches!(table["dt_s"], gearmodel::effect::Stated::Number(dt_s) if (dt_s - 6e-5).abs() < 2e-6),
+        "{table:?}"
+    );
 }
 
 #[test]
@@ -223,7 +233,8 @@ fn what_cannot_be_diagnosed_is_refused_with_what_to_do() {
     refused(&["diagnose", log, "--known", "gear3"], 2, &["gear3", "gear2_eccentricity"]);
     refused(&["diagnose", log, "--known", "slip", "--exclude", "slip"], 2, &["slip", "both"]);
     let pair = directory.path().join("wrong.toml");
-    std::fs::write(&pair, format!("{}\n[documented.time_skew]\ndt = 1\n", rigd::profile::DEFAULT_PAIR)).expect("a pair");
+    std::fs::write(&pair, format!("{}\n[documented.time_skew]\ndt = 1\n", rigd::profile::DEFAULT_PAIR))
+        .expect("a pair");
     refused(&["diagnose", log, "--pair", text(&pair)], 2, &["wrong.toml", "time_skew", "`dt`", "`dt_s`"]);
     refused(&["verify", log, "--model", text(&pair)], 2, &["wrong.toml", "`dt_s`"]);
     let other = directory.path().join("other.toml");
@@ -237,8 +248,11 @@ fn what_cannot_be_diagnosed_is_refused_with_what_to_do() {
     assert!(!out.exists());
     // Sound, but hardly any motion: the question cannot be answered.
     let table = directory.path().join("short.csv");
-    let rows: String = (0..200).map(|n| format!("{},{},{},5,5,ccw\n", f64::from(n) * 1e-3, f64::from(n) * 1e-3, f64::from(n) * 1e-3)).collect();
-    std::fs::write(&table, format!("time_s,theta1_rad,theta2_rad,load_nm,speed_rpm,direction\n{rows}")).expect("a table");
+    let rows: String = (0..200)
+        .map(|n| format!("{},{},{},5,5,ccw\n", f64::from(n) * 1e-3, f64::from(n) * 1e-3, f64::from(n) * 1e-3))
+        .collect();
+    std::fs::write(&table, format!("time_s,theta1_rad,theta2_rad,load_nm,speed_rpm,direction\n{rows}"))
+        .expect("a table");
     let short = directory.path().join("short.mcap");
     let imported = rigd(&["import", text(&table), "--pair", text(&other), "--out", text(&short)]);
     assert_eq!(imported.status.code(), Some(0), "{}", said(&imported));

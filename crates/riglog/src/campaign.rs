@@ -97,7 +97,9 @@ impl CampaignLogs {
 
     /// The text of each log's `pair.toml`, in order of time.
     pub fn pair_texts(&self) -> impl Iterator<Item = Option<String>> {
-        self.logs.iter().map(|(_, log)| log.attachment("pair.toml").map(|text| String::from_utf8_lossy(text).into_owned()))
+        self.logs
+            .iter()
+            .map(|(_, log)| log.attachment("pair.toml").map(|text| String::from_utf8_lossy(text).into_owned()))
     }
 
     /// Where the recorded runs are from: `sim`, or the name of a profile.
@@ -153,8 +155,7 @@ impl CampaignLogs {
                 sink.finish()
             });
             // The other end hangs up only when it panics; the join below then does, too.
-            let mut visitor =
-                Visitor { origin_ns: self.origin_ns, deliver: |parcel| drop(sender.send(parcel)) };
+            let mut visitor = Visitor { origin_ns: self.origin_ns, deliver: |parcel| drop(sender.send(parcel)) };
             let totals = log.stream(&mut visitor);
             drop(sender);
             let runs = reducing.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));

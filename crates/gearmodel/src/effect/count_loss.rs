@@ -4,7 +4,10 @@
 
 use std::f64::consts::TAU;
 
-use super::{Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect, StatedError, Station};
+use super::{
+    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
+    StatedEffect, StatedError, Station,
+};
 
 /// Lost counts of the output encoder.
 pub(super) struct CountLoss;

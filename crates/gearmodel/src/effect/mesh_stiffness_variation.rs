@@ -2,7 +2,10 @@
 //! carries and −duty elsewhere, zero in the mean over a pitch. `duty` is the share of a pitch on one pair. Shape [duty, start]:
 //! the stretch on one pair begins at u = start. The empty shape takes the stretches from the tips of the documented teeth.
 
-use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect, StatedError, Station, stated};
+use super::{
+    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
+    StatedError, Station, stated,
+};
 
 /// Variation of the mesh compliance over the pitch.
 pub(super) struct MeshStiffnessVariation;

@@ -2,7 +2,10 @@
 //! TE = dk ∂f/∂k. With tan(f/2) = c tan(θ1/2), c = (1+k)/(1−k): ∂f/∂k = 2 sin f/(1 − k²). Shape [1]: the pair closes
 //! otherwise (a wrong ratio), TE = dk·θ1, which grows with every revolution and returns when the sense turns.
 
-use super::{Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect, StatedError, Station, stated};
+use super::{
+    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
+    StatedEffect, StatedError, Station, stated,
+};
 
 /// Error of the pitch curves' form or closure.
 pub(super) struct PitchCurveError;

@@ -107,7 +107,9 @@ impl Effect for PitchErrors {
         for name in ["ccw_mm", "cw_mm"] {
             // The waves have no mean: a mean is a backlash, and stands there.
             let errors_mm = given.table(name, Some(teeth))?;
-            beta.extend((0..teeth - 1).map(|n| errors_mm.iter().enumerate().map(|(j, x)| x * wave(n, j, teeth)).sum::<f64>()));
+            beta.extend(
+                (0..teeth - 1).map(|n| errors_mm.iter().enumerate().map(|(j, x)| x * wave(n, j, teeth)).sum::<f64>()),
+            );
         }
         Ok((table(&beta, teeth), beta))
     }

@@ -3,7 +3,10 @@
 
 use std::f64::consts::TAU;
 
-use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect, StatedError, Station};
+use super::{
+    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
+    StatedError, Station,
+};
 
 /// Profile deviation by mesh orders.
 pub(super) struct ProfileError;
@@ -11,7 +14,17 @@ pub(super) struct ProfileError;
 const ORDERS: usize = 3;
 /// Parameters that a file may state: both flanks, or those driving ccw, then those driving cw.
 const STATED: [&str; 4 * ORDERS] = [
-    "a1_mm", "ph1_rad", "a2_mm", "ph2_rad", "a3_mm", "ph3_rad", "a1_cw_mm", "ph1_cw_rad", "a2_cw_mm", "ph2_cw_rad", "a3_cw_mm",
+    "a1_mm",
+    "ph1_rad",
+    "a2_mm",
+    "ph2_rad",
+    "a3_mm",
+    "ph3_rad",
+    "a1_cw_mm",
+    "ph1_cw_rad",
+    "a2_cw_mm",
+    "ph2_cw_rad",
+    "a3_cw_mm",
     "ph3_cw_rad",
 ];
 const NAMES: [[&str; 2]; ORDERS] = [["a1_mm", "ph1_rad"], ["a2_mm", "ph2_rad"], ["a3_mm", "ph3_rad"]];

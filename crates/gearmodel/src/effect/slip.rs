@@ -1,7 +1,9 @@
 //! A clamp creeps above a torque: a lag of k·max(0, T − t0) a driver revolution, in the sense of motion, that stays.
 //! TE = −k Σ dir·max(0, T − t0)·revolutions. The shape is [t0].
 
-use super::{Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station};
+use super::{
+    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station,
+};
 
 /// Slip of a clamp or coupling.
 pub(super) struct Slip;
@@ -49,8 +51,12 @@ impl Effect for Slip {
     fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
         let [threshold_nm] = shape[..] else { return };
         let ledger = &at.ledger;
-        row[0] =
-            -ledger.load_nm.iter().zip(&ledger.signed_rev).map(|(load, rev)| (load - threshold_nm).max(0.0) * rev).sum::<f64>();
+        row[0] = -ledger
+            .load_nm
+            .iter()
+            .zip(&ledger.signed_rev)
+            .map(|(load, rev)| (load - threshold_nm).max(0.0) * rev)
+            .sum::<f64>();
     }
 
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {

@@ -44,7 +44,9 @@ pub enum StatedError {
         allowed: String,
     },
     /// This pair cannot have it.
-    #[error("effect `{effect}` needs teeth, which a pair of constant ratio has not: describe the gears as circular, or leave it out")]
+    #[error(
+        "effect `{effect}` needs teeth, which a pair of constant ratio has not: describe the gears as circular, or leave it out"
+    )]
     NeedsTeeth {
         /// The effect.
         effect: &'static str,
@@ -189,7 +191,8 @@ impl<'a> Given<'a> {
                 Ok(table)
             }
             other => {
-                let needed = length.map_or("a list of finite numbers".to_owned(), |n| format!("a list of {n} finite numbers"));
+                let needed =
+                    length.map_or("a list of finite numbers".to_owned(), |n| format!("a list of {n} finite numbers"));
                 Err(self.kind(parameter, other, needed))
             }
         }

@@ -1,7 +1,9 @@
 //! The housing warms and the centre distance grows, Δa(t) = da (1 − exp(−t/τ)) since the campaign's first sample:
 //! TE = −dir·Δa(t) tan(α ∓ μ)/r2. The shape is [τ].
 
-use super::{Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station};
+use super::{
+    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station,
+};
 
 /// Thermal growth of the centre distance.
 pub(super) struct ThermalDrift;
@@ -38,10 +40,7 @@ impl Effect for ThermalDrift {
     }
 
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
-        vec![
-            Parameter::number("da_mm", found.beta[0], found.std(0), "mm"),
-            Parameter::grid("tau_s", shape[0], "s"),
-        ]
+        vec![Parameter::number("da_mm", found.beta[0], found.std(0), "mm"), Parameter::grid("tau_s", shape[0], "s")]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -3,7 +3,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station, Value};
+use super::{
+    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station, Value,
+};
 
 /// One damaged tooth flank.
 pub(super) struct ToothDamage;
@@ -27,9 +29,8 @@ impl Effect for ToothDamage {
     fn signature_of(&self, rig: &Rig, shape: &Shape) -> Signature {
         let [tooth, flank, width] = shape[..] else { return self.signature() };
         let half = if flank > 0.0 { 0.0 } else { 0.5 };
-        let at = |pitches: f64| {
-            rig.pair().theta1_at_arc_length((pitches + half) * PI * rig.pair().module_mm()).to_degrees()
-        };
+        let at =
+            |pitches: f64| rig.pair().theta1_at_arc_length((pitches + half) * PI * rig.pair().module_mm()).to_degrees();
         Signature { sector_deg: Some([at(tooth - width), at(tooth + width)]), ..self.signature() }
     }
 
@@ -75,7 +76,12 @@ impl Effect for ToothDamage {
             Parameter::grid("tooth", tooth, ""),
             Parameter::number("depth_mm", found.beta[0], found.std(0), "mm"),
             Parameter::grid("width", width, "pitches"),
-            Parameter { name: "flank", value: Value::Text(if flank > 0.0 { "ccw" } else { "cw" }), std: None, unit: "" },
+            Parameter {
+                name: "flank",
+                value: Value::Text(if flank > 0.0 { "ccw" } else { "cw" }),
+                std: None,
+                unit: "",
+            },
         ]
     }
 

@@ -4,7 +4,10 @@
 
 use std::f64::consts::TAU;
 
-use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect, StatedError, Station, stated};
+use super::{
+    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
+    StatedError, Station, stated,
+};
 
 /// What excites it, as a file states it: kind 1, then kind 0.
 const EXCITED_BY: [&str; 2] = ["mesh", "turn"];
@@ -70,8 +73,8 @@ impl Effect for TorsionalResonance {
         let (phase_rad, frequency_hz) = if kind == 1.0 {
             // u advances by Z/perimeter·ds/dθ1 a radian: with ds = r1/cos μ dθ1 the mesh frequency follows the local radius.
             let lean_rad = at.sense * (rig.pair().pressure_angle_rad() - at.pressure_rad);
-            let pitches_per_rad = at.r2_mm * at.ratio / lean_rad.cos() * f64::from(rig.pair().teeth().0)
-                / rig.pair().perimeter_mm();
+            let pitches_per_rad =
+                at.r2_mm * at.ratio / lean_rad.cos() * f64::from(rig.pair().teeth().0) / rig.pair().perimeter_mm();
             (TAU * at.pitches, pitches_per_rad * at.speed_rad_per_s.abs())
         } else {
             (at.theta1_rad, at.speed_rad_per_s.abs() / TAU)

@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 
 use super::predict::Condition;
 use super::reduce::ReducedRun;
+use crate::Direction;
 use crate::contact::ContactModel;
 use crate::effect::{Carrier, LEDGER_LOADS, Ledger, Rig, Station, Term};
 use crate::increment::common_normal;
-use crate::Direction;
 
 /// Angles a turn at which exact contact is tabulated against the first order.
 const STEPS: usize = 1440;
@@ -28,9 +28,8 @@ impl Nominal {
         let errors = rig.model().errors;
         let closes = (pair.closure() - pair.closure().round()).abs() < 1e-12;
         let displaced = errors.e1_mm != 0.0 || errors.e2_mm != 0.0;
-        let exact = (closes && displaced && pair.has_teeth())
-            .then(|| ContactModel::new(pair.clone(), &errors).ok())
-            .flatten();
+        let exact =
+            (closes && displaced && pair.has_teeth()).then(|| ContactModel::new(pair.clone(), &errors).ok()).flatten();
         let correction_rad = Direction::BOTH.map(|direction| {
             let Some(exact) = &exact else { return Vec::new() };
             (0..STEPS)
@@ -119,7 +118,8 @@ struct Book {
 impl Book {
     fn turn(&mut self, load_nm: f64, revolutions: f64) {
         let known = &self.book.load_nm[..self.loads];
-        let nearest = (0..self.loads).min_by(|a, b| (known[*a] - load_nm).abs().total_cmp(&(known[*b] - load_nm).abs()));
+        let nearest =
+            (0..self.loads).min_by(|a, b| (known[*a] - load_nm).abs().total_cmp(&(known[*b] - load_nm).abs()));
         let slot = match nearest {
             Some(slot) if (known[slot] - load_nm).abs() <= 0.02 * load_nm.abs() || self.loads == LEDGER_LOADS => slot,
             _ => {

@@ -67,10 +67,8 @@ fn difference(run: &RunTe, measured: &Curve, model: &NominalModel) -> Curve {
 
 fn predicted_curve(run: &RunTe, model: &NominalModel) -> Curve {
     let conditions = run.conditions();
-    let under = Condition {
-        speed_rpm: conditions.speed_rpm,
-        ..Condition::at_rest(conditions.direction, conditions.load_nm)
-    };
+    let under =
+        Condition { speed_rpm: conditions.speed_rpm, ..Condition::at_rest(conditions.direction, conditions.load_nm) };
     Curve::from_fn(run.grid(), |theta1_rad| model.te_under_rad(theta1_rad, &under))
 }
 

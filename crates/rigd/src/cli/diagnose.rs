@@ -66,7 +66,9 @@ pub fn main(args: &Args) -> Exit {
         return Exit::Incomplete;
     }
     if unanswered(diagnosis) {
-        eprintln!("warning: there is a gap, and this data does not tell its cause: see the warnings and the next experiments");
+        eprintln!(
+            "warning: there is a gap, and this data does not tell its cause: see the warnings and the next experiments"
+        );
         return Exit::Incomplete;
     }
     Exit::Done
@@ -86,7 +88,10 @@ fn write_files(args: &Args, pair: &PairFile, diagnosis: &Diagnosis) -> Result<()
         let (model, left_out) = match pair.with_found(&diagnosis.found) {
             Ok(model) => model,
             Err(error) => {
-                eprintln!("error: --write-model {}: the pair with the found effects is no model: {error}", path.display());
+                eprintln!(
+                    "error: --write-model {}: the pair with the found effects is no model: {error}",
+                    path.display()
+                );
                 return Err(Exit::Failed);
             }
         };

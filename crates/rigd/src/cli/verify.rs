@@ -63,7 +63,9 @@ pub fn main(args: &Args) -> Exit {
             "within_rad": args.within_urad.map(|urad| urad * 1e-6),
             "passed": failed == 0,
         });
-        if let (Some(object), Ok(serde_json::Value::Object(fields))) = (object.as_object_mut(), serde_json::to_value(&verified)) {
+        if let (Some(object), Ok(serde_json::Value::Object(fields))) =
+            (object.as_object_mut(), serde_json::to_value(&verified))
+        {
             object.extend(fields);
         }
         print(&object.to_string());
@@ -85,7 +87,8 @@ fn passes(args: &Args, row: &VerifiedRow) -> bool {
 }
 
 fn table(args: &Args, verified: &Verified) -> String {
-    let mut text = String::from("sense  load N.m  speed rpm  revs   mean urad  residual urad rms  floor urad rms  ratio\n");
+    let mut text =
+        String::from("sense  load N.m  speed rpm  revs   mean urad  residual urad rms  floor urad rms  ratio\n");
     let mut line = |row: &VerifiedRow, verdict: &str| {
         let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
         // Writing to a String cannot fail.
@@ -103,7 +106,16 @@ fn table(args: &Args, verified: &Verified) -> String {
         );
     };
     for row in &verified.runs {
-        line(row, if passes(args, row) { "within" } else if row.ratio.is_none() { "cannot say" } else { "BEYOND" });
+        line(
+            row,
+            if passes(args, row) {
+                "within"
+            } else if row.ratio.is_none() {
+                "cannot say"
+            } else {
+                "BEYOND"
+            },
+        );
     }
     for row in &verified.directions {
         line(row, "all");
