@@ -42,7 +42,7 @@ def test_refused_by_name():
     with pytest.raises(gm.GeometryError, match="no parameter `dt`: it has `dt_s`"):
         gm.GearPair.from_toml(PAIR + "[documented.time_skew]\ndt = 5e-5\n")
     pair = gm.GearPair.from_toml(PAIR)
-    with pytest.raises(ValueError, match="speed_rpm is nan"):
+    with pytest.raises(ValueError, match="speed_rpm is NaN"):
         te(pair, speed_rpm=float("nan"))
 
 

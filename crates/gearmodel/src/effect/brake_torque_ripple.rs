@@ -52,7 +52,7 @@ impl Effect for BrakeTorqueRipple {
         &["rho", "n", "phase_rad"]
     }
 
-    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         Ok((vec![given.number_in("n", 1.0, 1e4)?], given.polar("rho")?))
     }
 }

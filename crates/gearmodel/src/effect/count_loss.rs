@@ -62,7 +62,7 @@ impl Effect for CountLoss {
         &["counts", "step_rad", "steps", "times_s"]
     }
 
-    fn from_parameters(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let step_rad = match rig.output_counts_per_rev {
             Some(counts_per_rev) if given.has("counts") && !given.has("step_rad") => {
                 given.number("counts")? * TAU / counts_per_rev

@@ -59,7 +59,7 @@ impl Effect for CouplingMisalignment {
         &["beta_rad", "phase_rad"]
     }
 
-    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         // The amplitude of order 2 is β²/4.
         let (beta_rad, phase_rad) = (given.number_in("beta_rad", 0.0, 1.0)?, given.number("phase_rad")?);
         let amplitude_rad = 0.25 * beta_rad * beta_rad;

@@ -48,7 +48,7 @@ impl Term {
             return Err(StatedError::NeedsTeeth { effect: effect.name() });
         }
         let given = Given::new(effect.name(), effect.parameter_names(), stated)?;
-        let (shape, beta) = effect.from_parameters(rig, &given)?;
+        let (shape, beta) = effect.amplitudes(rig, &given)?;
         Ok(Self { effect, shape, beta })
     }
 

@@ -46,7 +46,7 @@ impl Effect for EncoderEccentricity {
         &["eps", "phase_rad"]
     }
 
-    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         Ok((Shape::new(), given.polar("eps")?))
     }
 }

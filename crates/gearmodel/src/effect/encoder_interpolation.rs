@@ -59,7 +59,7 @@ impl Effect for EncoderInterpolation {
         &["a_rad", "lines", "phase_rad", "order"]
     }
 
-    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let order = if given.has("order") { given.number_in("order", 1.0, 100.0)? } else { 1.0 };
         Ok((vec![order, given.number_in("lines", 1.0, 1e9)?], given.polar("a_rad")?))
     }

@@ -74,7 +74,7 @@ impl Effect for MeshStiffnessVariation {
         &["c_mm2_rad_per_nm", "duty", "start_pitches"]
     }
 
-    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let shape = if given.has("duty") {
             let duty = given.number_in("duty", 0.0, 1.0)?;
             // Where nothing else is said the stretch on one pair lies about the pitch point.

@@ -175,7 +175,7 @@ pub trait Effect: Sync {
     ///
     /// # Errors
     /// [`StatedError`] that names the parameter.
-    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         stated::linear(given)
     }
 

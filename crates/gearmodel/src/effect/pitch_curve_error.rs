@@ -68,7 +68,7 @@ impl Effect for PitchCurveError {
         &["dk", "of"]
     }
 
-    fn from_parameters(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let form_first = rig.eccentricity().is_some();
         let word = given.word("of", if form_first { &["form", "closure"] } else { &["closure"] }, true)?;
         let shape = if form_first && word == 0 { 0.0 } else { 1.0 };

@@ -101,7 +101,7 @@ impl Effect for PitchErrors {
         &["ccw_mm", "cw_mm"]
     }
 
-    fn from_parameters(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let teeth = teeth(rig);
         let mut beta = Vec::with_capacity(2 * (teeth - 1));
         for name in ["ccw_mm", "cw_mm"] {

@@ -77,7 +77,7 @@ impl Effect for ProfileError {
         &STATED
     }
 
-    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let both = !STATED[2 * ORDERS..].iter().any(|name| given.has(name));
         let waves = if both { ORDERS } else { 2 * ORDERS };
         let mut beta = Vec::with_capacity(2 * waves);

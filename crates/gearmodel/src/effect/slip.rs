@@ -70,7 +70,7 @@ impl Effect for Slip {
         &["k_rad_per_rev_nm", "t0_nm"]
     }
 
-    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         Ok((vec![given.number_in("t0_nm", 0.0, 1e9)?], vec![given.number("k_rad_per_rev_nm")?]))
     }
 }

@@ -47,7 +47,7 @@ impl Effect for ThermalDrift {
         &["da_mm", "tau_s"]
     }
 
-    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         Ok((vec![given.number_in("tau_s", 1e-9, 1e12)?], vec![given.number("da_mm")?]))
     }
 }

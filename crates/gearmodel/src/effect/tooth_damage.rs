@@ -89,7 +89,7 @@ impl Effect for ToothDamage {
         &["tooth", "depth_mm", "width", "flank"]
     }
 
-    fn from_parameters(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let last = f64::from(rig.pair().teeth().0) - 1.0;
         let flank = if given.word("flank", &["ccw", "cw"], false)? == 0 { 1.0 } else { -1.0 };
         let shape = vec![given.number_in("tooth", 0.0, last)?.round(), flank, given.number_in("width", 0.01, 2.0)?];

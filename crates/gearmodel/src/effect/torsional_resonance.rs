@@ -99,7 +99,7 @@ impl Effect for TorsionalResonance {
         &["f_hz", "zeta", "excitation_rad", "phase_rad", "excited_by"]
     }
 
-    fn from_parameters(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let kind = if given.word("excited_by", &EXCITED_BY, true)? == 0 { 1.0 } else { 0.0 };
         let shape = vec![kind, given.number_in("f_hz", 1e-6, 1e9)?, given.number_in("zeta", 1e-6, 10.0)?];
         Ok((shape, given.polar("excitation_rad")?))

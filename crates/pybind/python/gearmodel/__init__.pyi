@@ -7,6 +7,7 @@ from ._analysis import (
     Waves as Waves,
     WaveSplit as WaveSplit,
 )
+from ._diagnosis import CalibratedModel as CalibratedModel, Diagnosis as Diagnosis, diagnose as diagnose
 from ._native import (
     Analysis as Analysis,
     Errors as Errors,
@@ -33,6 +34,8 @@ from ._study import SweepTable as SweepTable, Tolerance as Tolerance, ToleranceF
 
 __all__ = [
     "Analysis",
+    "CalibratedModel",
+    "Diagnosis",
     "Errors",
     "Event",
     "Floor",
@@ -59,6 +62,7 @@ __all__ = [
     "Waves",
     "analyse",
     "backlash_from",
+    "diagnose",
     "cluster",
     "read_log",
     "sweep",
