@@ -30,6 +30,10 @@ pub enum GeometryError {
         advice: &'static str,
     },
 
+    /// A documented effect that does not fit the pair or is not fixed by its parameters.
+    #[error("documented {0}")]
+    Documented(#[from] crate::effect::StatedError),
+
     /// A tooth number outside the limits.
     #[error("gear {gear} has {teeth} teeth: {lower} to {upper} are accepted")]
     Teeth {

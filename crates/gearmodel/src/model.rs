@@ -1,5 +1,9 @@
 //! The nominal model: a pair with its documented errors under load.
 
+use std::collections::BTreeMap;
+
+use crate::effect::{Documented, StatedEffect};
+use crate::gap::predict::Condition;
 use crate::increment::common_normal;
 use crate::{Direction, Errors, GearPair, GeometryError, MeshPoint};
 
@@ -10,6 +14,8 @@ pub struct NominalModel {
     pub pair: GearPair,
     /// Its documented errors.
     pub errors: Errors,
+    /// Documented effects beyond those.
+    pub effects: Documented,
 }
 
 impl NominalModel {
@@ -19,17 +25,52 @@ impl NominalModel {
     /// [`GeometryError`] when an error is not finite or a length or compliance is negative.
     pub fn new(pair: GearPair, errors: Errors) -> Result<Self, GeometryError> {
         errors.check()?;
-        Ok(Self { pair, errors })
+        Ok(Self::bare(pair, errors))
     }
 
-    /// Predicted TE at θ1, rad: eccentricities and designed backlash along the common normal plus the wind-up under
-    /// `load_nm` on the driven shaft.
+    /// A pair with documented errors, and effects by name and parameters; those that are changes of an error go there.
+    ///
+    /// # Errors
+    /// [`GeometryError`] as for [`NominalModel::new`], and where an effect does not fit the pair or is not fixed by its
+    /// parameters.
+    pub fn with_effects(
+        pair: GearPair,
+        mut errors: Errors,
+        effects: &BTreeMap<String, Vec<StatedEffect>>,
+    ) -> Result<Self, GeometryError> {
+        errors.check()?;
+        let effects = Documented::from_stated(&pair, &mut errors, effects)?;
+        errors.check()?;
+        Ok(Self { pair, errors, effects })
+    }
+
+    /// A model of errors that were checked before, and no effects.
+    #[must_use]
+    pub fn bare(pair: GearPair, errors: Errors) -> Self {
+        Self { pair, errors, effects: Documented::default() }
+    }
+
+    /// Predicted TE at θ1, rad: eccentricities and designed backlash along the common normal, the wind-up under
+    /// `load_nm` on the driven shaft, and what documented effects add at rest and at the start.
     #[must_use]
     pub fn te_rad(&self, theta1_rad: f64, direction: Direction, load_nm: f64) -> f64 {
-        self.te_at_rad(&self.pair.at(theta1_rad), direction, load_nm)
+        self.te_under_rad(theta1_rad, &Condition::at_rest(direction, load_nm))
     }
 
-    /// [`NominalModel::te_rad`] where the kinematics are at hand already.
+    /// Predicted TE at θ1 where speed, time and revolutions matter too, rad.
+    #[must_use]
+    pub fn te_under_rad(&self, theta1_rad: f64, under: &Condition) -> f64 {
+        self.te_at_rad(&self.pair.at(theta1_rad), under.direction, under.load_nm)
+            + self.effects_te_rad(theta1_rad, under)
+    }
+
+    /// What the documented effects add to the errors' TE, rad.
+    #[must_use]
+    pub fn effects_te_rad(&self, theta1_rad: f64, under: &Condition) -> f64 {
+        self.effects.rig().map_or(0.0, |rig| self.effects.te_rad(&under.station(rig, theta1_rad)))
+    }
+
+    /// TE of the errors alone, without documented effects, where the kinematics are at hand already.
     #[must_use]
     pub fn te_at_rad(&self, at: &MeshPoint, direction: Direction, load_nm: f64) -> f64 {
         common_normal::eccentricity_te_rad(&self.pair, &self.errors, at, direction)
@@ -51,7 +92,13 @@ impl NominalModel {
     /// Predicted backlash at θ1 under load, rad at the driven shaft: TE_cw − TE_ccw.
     #[must_use]
     pub fn backlash_rad(&self, theta1_rad: f64, load_nm: f64) -> f64 {
-        let at = self.pair.at(theta1_rad);
-        self.te_at_rad(&at, Direction::Cw, load_nm) - self.te_at_rad(&at, Direction::Ccw, load_nm)
+        self.backlash_under_rad(theta1_rad, &Condition::at_rest(Direction::Ccw, load_nm))
+    }
+
+    /// The same where speed, time and revolutions matter too; the sense of `under` does not.
+    #[must_use]
+    pub fn backlash_under_rad(&self, theta1_rad: f64, under: &Condition) -> f64 {
+        let te_rad = |direction| self.te_under_rad(theta1_rad, &Condition { direction, ..*under });
+        te_rad(Direction::Cw) - te_rad(Direction::Ccw)
     }
 }

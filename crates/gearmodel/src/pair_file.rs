@@ -1,9 +1,15 @@
 //! `pair.toml`: a pair and its documented errors as a file.
 
+#[path = "pair_file_documented.rs"]
+mod documented;
+
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Deserialize;
 
+use self::documented::RawDocumented;
+use crate::effect::StatedEffect;
 use crate::{CircularSpec, CurveSpec, EllipticalSpec, Errors, GearPair, GeometryError, NominalModel, ToothSpec};
 
 /// A pair as its file states it, by kind.
@@ -66,6 +72,9 @@ pub struct PairFile {
     pub gears: PairSpec,
     /// `[documented]`: errors that the nominal model contains.
     pub documented: Errors,
+    /// `[documented.<effect>]`: effects of the diagnosis' library that it contains too, by name; several of one effect
+    /// (`[[documented.<effect>]]`) add up.
+    pub effects: BTreeMap<String, Vec<StatedEffect>>,
 }
 
 /// Why a `pair.toml` cannot be used.
@@ -136,7 +145,7 @@ struct RawFile {
     theta1_rad: Option<Vec<f64>>,
     radius: Option<Vec<f64>>,
     #[serde(default)]
-    documented: Errors,
+    documented: RawDocumented,
 }
 
 const TOOTH_KEYS: [&str; 8] = [
@@ -185,7 +194,7 @@ impl PairFile {
         } else {
             PairSpec::Constant { ratio: need(kind, "ratio", raw.ratio)? }
         };
-        Ok(Self { gears, documented: raw.documented })
+        Ok(Self { gears, documented: raw.documented.errors, effects: raw.documented.effects })
     }
 
     /// The nominal model, checked.
@@ -193,7 +202,7 @@ impl PairFile {
     /// # Errors
     /// [`GeometryError`] when the pair cannot be made or an error is out of range.
     pub fn model(&self) -> Result<NominalModel, GeometryError> {
-        NominalModel::new(self.gears.build()?, self.documented)
+        NominalModel::with_effects(self.gears.build()?, self.documented, &self.effects)
     }
 
     /// The text of a `pair.toml` that [`PairFile::parse`] reads back to the same value.
@@ -245,6 +254,7 @@ impl PairFile {
         line("shaft_compliance_output_rad_per_nm", &errors.shaft_compliance_output_rad_per_nm);
         line("shaft_compliance_input_rad_per_nm", &errors.shaft_compliance_input_rad_per_nm);
         line("mesh_compliance_mm2_rad_per_nm", &errors.mesh_compliance_mm2_rad_per_nm);
+        documented::write(&mut text, &self.effects);
         text
     }
 }

@@ -1,9 +1,12 @@
 //! `diagnose`: the gap between a pair's nominal model and recordings.
 
+use std::path::PathBuf;
+
 use gearmodel::Direction;
 use gearmodel::gap::{self, Options};
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use riglog::CampaignLogs;
 
 use crate::array::Numbers;
 use crate::error::{Raised, Result};
@@ -72,11 +75,16 @@ impl NativeDiagnosis {
         let at = gap::predict::Condition { direction, load_nm, speed_rpm, time_s, revolutions };
         let found = &self.diagnosis.found;
         let theta1 = Numbers::take("theta1", theta1)?;
-        let te = theta1.map(py, |theta1_rad| {
-            self.nominal.te_rad(theta1_rad, direction, load_nm) + found.te_rad(theta1_rad, &at).0
-        })?;
+        let te = theta1
+            .map(py, |theta1_rad| self.nominal.te_under_rad(theta1_rad, &at) + found.te_rad(theta1_rad, &at).0)?;
         let std = theta1.map(py, |theta1_rad| found.te_rad(theta1_rad, &at).1)?;
         Ok((te, std))
+    }
+
+    /// The pair with the found effects documented, and what could not be written down.
+    fn calibrated(&self, pair: &Bound<'_, GearPair>) -> Result<(GearPair, Vec<String>)> {
+        let (file, left_out) = pair.get().file.with_found(&self.diagnosis.found)?;
+        Ok((GearPair::from_file(file)?, left_out))
     }
 }
 
@@ -98,4 +106,26 @@ pub fn diagnose(
     let options = Options { known, exclude };
     let (diagnosis, nominal) = py.detach(|| gap::diagnose_with_nominal(&recordings, &model, &options))?;
     Ok(NativeDiagnosis { diagnosis, nominal })
+}
+
+/// The gap between a pair's nominal model and logs, which are read block by block and never held; see `gearmodel.diagnose`.
+#[pyfunction]
+#[pyo3(signature = (paths, pair, known, exclude))]
+pub fn diagnose_logs(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    pair: &Bound<'_, GearPair>,
+    known: Vec<String>,
+    exclude: Vec<String>,
+) -> Result<(NativeDiagnosis, Vec<String>)> {
+    let model = pair.get().model.clone();
+    let options = Options { known, exclude };
+    py.detach(|| {
+        let logs = CampaignLogs::open(&paths)?;
+        let nominal = gap::Nominal::new(logs.rig(model));
+        let reduced = logs.reduce(&nominal)?;
+        let incomplete = reduced.incomplete();
+        let diagnosis = gap::diagnose_runs(&nominal, reduced.runs, &options)?;
+        Ok((NativeDiagnosis { diagnosis, nominal }, incomplete))
+    })
 }

@@ -132,6 +132,14 @@ pub enum InputError {
         /// What numpy says.
         reason: String,
     },
+    /// NaN or infinity where a condition is needed.
+    #[error("{name} is {value}: a finite number is needed")]
+    NotFinite {
+        /// The argument.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+    },
     /// A count below 0, or beyond any.
     #[error("{field} is {given}: a whole number of at least 0 is needed, within what computers count")]
     Count {

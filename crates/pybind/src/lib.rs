@@ -30,7 +30,7 @@ mod _native {
     #[pymodule_export]
     use crate::backlash::{MeasuredBacklash, backlash_from};
     #[pymodule_export]
-    use crate::diagnosis::{NativeDiagnosis, diagnose};
+    use crate::diagnosis::{NativeDiagnosis, diagnose, diagnose_logs};
     #[pymodule_export]
     use crate::error::{GeometryError, LogError};
     #[pymodule_export]

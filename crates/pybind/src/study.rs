@@ -202,7 +202,7 @@ impl GearPair {
         }
         let (pairs, angles, seed) = (count("n", n)?, count("angles", angles)?, count("seed", seed)?);
         let study = ToleranceStudy { scatter, load_nm, pairs, angles, seed };
-        let model = self.model_with(errors.map(Bound::get));
+        let model = self.model_with(errors.map(Bound::get))?;
         let heard = Progress::new(progress, pairs);
         let figures = py.detach(|| study.run(&model, &|done| heard.hear(done)))?;
         heard.finish()?;

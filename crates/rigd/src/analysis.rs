@@ -1,5 +1,6 @@
 //! TE and backlash of a whole log: the same code for the live rig and for a replay, so that both give the same bits.
 
+use gearmodel::gap::predict::Condition;
 use gearmodel::measure::{AngleGrid, BacklashCurve, Curve, RunConditions, RunTe, TePoint};
 use gearmodel::{Direction, NominalModel};
 use sha2::{Digest as _, Sha256};
@@ -132,14 +133,18 @@ impl Analysis {
     /// Predicted TE on the grid, at a run's conditions.
     #[must_use]
     pub fn predicted(&self, conditions: &RunConditions) -> Curve {
-        Curve::from_fn(AngleGrid::default(), |theta1| {
-            self.model.te_rad(theta1, conditions.direction, conditions.load_nm)
-        })
+        let under = under(conditions);
+        Curve::from_fn(AngleGrid::default(), |theta1| self.model.te_under_rad(theta1, &under))
     }
 
-    /// Predicted backlash on the grid.
+    /// Predicted backlash on the grid, at a run's load and speed.
     #[must_use]
-    pub fn predicted_backlash(&self, load_nm: f64) -> BacklashCurve {
-        BacklashCurve::predicted(&self.model, AngleGrid::default(), load_nm)
+    pub fn predicted_backlash(&self, conditions: &RunConditions) -> BacklashCurve {
+        BacklashCurve::predicted_under(&self.model, AngleGrid::default(), &under(conditions))
     }
+}
+
+/// Load and speed of a run, at the campaign's start: a run's own history is not known here.
+fn under(conditions: &RunConditions) -> Condition {
+    Condition { speed_rpm: conditions.speed_rpm, ..Condition::at_rest(conditions.direction, conditions.load_nm) }
 }

@@ -57,8 +57,24 @@ pub fn load(path: Option<&Path>) -> Result<(String, NominalModel), PairError> {
 /// # Errors
 /// [`PairError`].
 pub fn parse(text: &str, path: &Path) -> Result<NominalModel, PairError> {
-    PairFile::parse(text)
-        .map_err(|source| PairError::Text { path: path.into(), source })?
-        .model()
-        .map_err(|source| PairError::Geometry { path: path.into(), source })
+    Ok(parse_file(text, path)?.1)
+}
+
+/// The same with the file's content.
+///
+/// # Errors
+/// [`PairError`].
+pub fn parse_file(text: &str, path: &Path) -> Result<(PairFile, NominalModel), PairError> {
+    let file = PairFile::parse(text).map_err(|source| PairError::Text { path: path.into(), source })?;
+    let model = file.model().map_err(|source| PairError::Geometry { path: path.into(), source })?;
+    Ok((file, model))
+}
+
+/// Reads the file at `path`.
+///
+/// # Errors
+/// [`PairError`].
+pub fn load_file(path: &Path) -> Result<(PairFile, NominalModel), PairError> {
+    let text = std::fs::read_to_string(path).map_err(|source| PairError::Read { path: path.into(), source })?;
+    parse_file(&text, path)
 }

@@ -66,7 +66,7 @@ pub fn draw(analysis: &Analysis, path: &Path) -> Result<bool, PlotError> {
             name: "backlash".into(),
             ink: Ink::Backlash,
             measured: measured.curve.curve.clone(),
-            predicted: analysis.predicted_backlash(load).curve,
+            predicted: analysis.predicted_backlash(&measured.conditions).curve,
         })
         .collect();
     let title = format!("{load} N·m, {} rpm", last.te.conditions().speed_rpm);

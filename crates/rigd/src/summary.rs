@@ -300,7 +300,7 @@ fn verdict(te: &TeFigures) -> String {
 
 fn backlash(analysis: &Analysis, measured: &MeasuredBacklash) -> BacklashFigures {
     let RunConditions { load_nm, speed_rpm, .. } = measured.conditions;
-    let predicted = analysis.predicted_backlash(load_nm);
+    let predicted = analysis.predicted_backlash(&measured.conditions);
     let differences: Vec<f64> = measured
         .curve
         .curve

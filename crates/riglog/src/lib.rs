@@ -3,11 +3,13 @@
 //! - [`LogWriter`] writes a log so that a killed process, a full disk or a power cut leaves a clean prefix of it.
 //! - [`LogReader`] reads any log in file order, whole or cut off, a chunk at a time, and says whether it is whole.
 //! - [`recover()`] finalises what a killed writer left.
-//! - [`info()`] says what is in a log; [`RunStream`] and [`read_runs`] give its runs as shaft angles.
+//! - [`info()`] says what is in a log; [`RunStream`] and [`read_runs`] give its runs as shaft angles, [`CampaignLogs`] those of
+//!   several logs as points for the gap diagnosis.
 //!
 //! Messages and their units are those of `proto/rig.proto`; times are ns since the Unix epoch.
 
 mod batch;
+mod campaign;
 mod completeness;
 mod error;
 mod info;
@@ -24,6 +26,7 @@ mod walk;
 mod write;
 
 pub use batch::BatchBuilder;
+pub use campaign::{CampaignLogs, ReducedLogs};
 pub use completeness::{Completeness, Defect};
 pub use error::{BatchError, LogError};
 pub use info::{AttachmentInfo, ChannelInfo, LogInfo, RunInfo, info};

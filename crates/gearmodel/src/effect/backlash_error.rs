@@ -30,4 +30,8 @@ impl Effect for BacklashError {
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("dj_mm", found.beta[0], found.std(0), "mm")]
     }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["dj_mm"]
+    }
 }

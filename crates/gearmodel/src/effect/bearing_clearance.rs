@@ -34,4 +34,8 @@ impl Effect for BearingClearance {
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("c_mm", found.beta[0], found.std(0), "mm")]
     }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["c_mm"]
+    }
 }

@@ -30,4 +30,8 @@ impl Effect for BearingCompliance {
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("c_mm_per_n", found.beta[0], found.std(0), "mm/N")]
     }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["c_mm_per_n"]
+    }
 }

@@ -1,7 +1,7 @@
 //! The brake's torque ripples with order n of the driven shaft, T (1 + ρ sin(nθ2 − φ)), and winds the train up:
 //! TE = −dir·T·C(θ1)·ρ sin(nθ2 − φ), C the documented compliance of the train. The shape is [n].
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station};
 
 /// Torque ripple of the brake.
 pub(super) struct BrakeTorqueRipple;
@@ -46,5 +46,13 @@ impl Effect for BrakeTorqueRipple {
         let mut parameters = found.polar(0).parameters("rho", "");
         parameters.insert(1, Parameter::grid("n", shape[0], ""));
         parameters
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["rho", "n", "phase_rad"]
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        Ok((vec![given.number_in("n", 1.0, 1e4)?], given.polar("rho")?))
     }
 }

@@ -35,4 +35,8 @@ impl Effect for CentreDistanceError {
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("da_mm", found.beta[0], found.std(0), "mm")]
     }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["da_mm"]
+    }
 }

@@ -4,7 +4,10 @@
 
 use std::f64::consts::TAU;
 
-use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+use super::{
+    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
+    StatedEffect, StatedError, Station,
+};
 
 /// Lost counts of the output encoder.
 pub(super) struct CountLoss;
@@ -53,5 +56,27 @@ impl Effect for CountLoss {
         parameters.push(Parameter::number("step_rad", step_rad, found.std(0), "rad"));
         parameters.push(Parameter::number("steps", steps, 0.0, ""));
         parameters
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["counts", "step_rad", "steps", "per_rev", "times_s"]
+    }
+
+    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        let step_rad = match rig.output_counts_per_rev {
+            Some(counts_per_rev) if given.has("counts") && !given.has("step_rad") => {
+                -given.number("counts")? * TAU / counts_per_rev
+            }
+            _ => given.number("step_rad")?,
+        };
+        let mut times_s = given.table("times_s", None)?.to_vec();
+        times_s.sort_by(f64::total_cmp);
+        Ok((times_s, vec![step_rad]))
+    }
+
+    fn stated(&self, _rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+        [("step_rad", Stated::Number(beta[0])), ("times_s", Stated::Table(shape.clone()))]
+            .map(|(name, value)| (name.to_owned(), value))
+            .into()
     }
 }

@@ -2,7 +2,7 @@
 //! In the output shaft the encoder reads θ2 + (β²/4) sin(2θ2 − φ); in the input shaft gear 1 stands at θ1 + (β²/4) sin(2θ1 − φ),
 //! seen as i times that.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
 
 /// Misalignment of the coupling in the input or output shaft.
 pub(super) struct CouplingMisalignment(pub(super) Shaft);
@@ -53,5 +53,16 @@ impl Effect for CouplingMisalignment {
             Parameter::number("beta_rad", 2.0 * root, polar.amplitude_std / root, "rad"),
             Parameter::number("phase_rad", polar.phase_rad, polar.phase_std_rad, "rad"),
         ]
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["beta_rad", "phase_rad"]
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        // The amplitude of order 2 is β²/4.
+        let (beta_rad, phase_rad) = (given.number_in("beta_rad", 0.0, 1.0)?, given.number("phase_rad")?);
+        let amplitude_rad = 0.25 * beta_rad * beta_rad;
+        Ok((Shape::new(), vec![amplitude_rad * phase_rad.cos(), -amplitude_rad * phase_rad.sin()]))
     }
 }

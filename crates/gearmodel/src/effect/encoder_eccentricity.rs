@@ -1,7 +1,7 @@
 //! An encoder's disc sits off its shaft's axis by eps track radii: it reads θ + eps sin(θ − φ) to first order. Seen in TE as
 //! −i eps sin(θ1 − φ) for the input encoder, eps sin(θ2 − φ) for the output encoder.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
 
 /// Eccentricity of the input or output encoder's disc.
 pub(super) struct EncoderEccentricity(pub(super) Shaft);
@@ -40,6 +40,14 @@ impl Effect for EncoderEccentricity {
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         found.polar(0).parameters("eps", "")
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["eps", "phase_rad"]
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        Ok((Shape::new(), given.polar("eps")?))
     }
 }
 

@@ -2,7 +2,7 @@
 //! −i eps sin(2θ1 − φ) or eps sin(2θ2 − φ).
 
 use super::encoder_eccentricity::reading_error;
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
 
 /// Order 2 of the input or output encoder.
 pub(super) struct EncoderEllipticity(pub(super) Shaft);
@@ -41,5 +41,13 @@ impl Effect for EncoderEllipticity {
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         found.polar(0).parameters("eps", "")
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["eps", "phase_rad"]
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        Ok((Shape::new(), given.polar("eps")?))
     }
 }

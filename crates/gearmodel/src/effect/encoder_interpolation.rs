@@ -3,7 +3,7 @@
 //! on the samples (`gap::line_phase`). The shape is [order h, lines L].
 
 use super::encoder_eccentricity::reading_error;
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
 
 /// Interpolation error of the input or output encoder.
 pub(super) struct EncoderInterpolation(pub(super) Shaft);
@@ -53,5 +53,14 @@ impl Effect for EncoderInterpolation {
             parameters.push(Parameter::grid("order", order, ""));
         }
         parameters
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["a_rad", "lines", "phase_rad", "order"]
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        let order = if given.has("order") { given.number_in("order", 1.0, 100.0)? } else { 1.0 };
+        Ok((vec![order, given.number_in("lines", 1.0, 1e9)?], given.polar("a_rad")?))
     }
 }

@@ -34,4 +34,8 @@ impl Effect for FrictionWindup {
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("torque_nm", found.beta[0], found.std(0), "N.m")]
     }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["torque_nm"]
+    }
 }

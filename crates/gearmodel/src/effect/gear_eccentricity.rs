@@ -3,7 +3,7 @@
 //! By the increment along the common normal, with a = dir·(α ∓ μ) (`increment::common_normal`):
 //! TE = [dx sin(θ1 + a) + dy cos(θ1 + a)]/A for gear 1, [dx sin(θ2 − a) + dy cos(θ2 − a)]/A for gear 2.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Fold, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
 
 /// Eccentricity of gear 1 (input) or gear 2 (output) against the documented one.
 pub(super) struct GearEccentricity(pub(super) Shaft);
@@ -48,5 +48,13 @@ impl Effect for GearEccentricity {
             Parameter::number("dx_mm", found.beta[0], found.std(0), "mm"),
             Parameter::number("dy_mm", found.beta[1], found.std(1), "mm"),
         ]
+    }
+
+    fn folds_into(&self) -> Option<Fold> {
+        Some(Fold::Eccentricity(self.0))
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["dx_mm", "dy_mm"]
     }
 }

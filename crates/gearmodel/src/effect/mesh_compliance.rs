@@ -1,6 +1,6 @@
 //! The teeth give way along the common normal: TE = −dir·T·C/A².
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Fold, Parameter, Parity, Rig, Shape, Signature, Station};
 
 /// The teeth give way along the common normal.
 pub(super) struct MeshCompliance;
@@ -28,5 +28,13 @@ impl Effect for MeshCompliance {
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("c_mm2_rad_per_nm", found.beta[0], found.std(0), "mm2.rad/(N.m)")]
+    }
+
+    fn folds_into(&self) -> Option<Fold> {
+        Some(Fold::MeshCompliance)
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["c_mm2_rad_per_nm"]
     }
 }

@@ -2,7 +2,10 @@
 //! carries and −duty elsewhere, zero in the mean over a pitch. `duty` is the share of a pitch on one pair. Shape [duty, start]:
 //! the stretch on one pair begins at u = start. The empty shape takes the stretches from the tips of the documented teeth.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+use super::{
+    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
+    StatedError, Station, stated,
+};
 
 /// Variation of the mesh compliance over the pitch.
 pub(super) struct MeshStiffnessVariation;
@@ -68,5 +71,30 @@ impl Effect for MeshStiffnessVariation {
             Parameter::number("c_mm2_rad_per_nm", found.beta[0], found.std(0), "mm2.rad/(N.m)"),
             Parameter::grid("duty", duty, ""),
         ]
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["c_mm2_rad_per_nm", "duty", "start_pitches"]
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        let shape = if given.has("duty") {
+            let duty = given.number_in("duty", 0.0, 1.0)?;
+            // Where nothing else is said the stretch on one pair lies about the pitch point.
+            vec![duty, given.number_or("start_pitches", -0.5 * duty)?]
+        } else {
+            Shape::new()
+        };
+        Ok((shape, vec![given.number("c_mm2_rad_per_nm")?]))
+    }
+
+    fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+        let mut stated = stated::by_parameters(self, rig, shape, beta);
+        match shape[..] {
+            [_, start] => stated.insert("start_pitches".to_owned(), Stated::Number(start)),
+            // The tips of the teeth say where one pair carries.
+            _ => stated.remove("duty"),
+        };
+        stated
     }
 }

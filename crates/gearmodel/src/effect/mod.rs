@@ -19,6 +19,7 @@ mod brake_torque_ripple;
 mod centre_distance_error;
 mod count_loss;
 mod coupling_misalignment;
+mod documented;
 mod encoder_eccentricity;
 mod encoder_ellipticity;
 mod encoder_interpolation;
@@ -35,6 +36,7 @@ mod rig;
 mod shaft_compliance;
 mod signature;
 mod slip;
+mod stated;
 mod station;
 mod thermal_drift;
 mod time_skew;
@@ -42,9 +44,11 @@ mod tooth_damage;
 mod torsional_resonance;
 mod wear_drift;
 
+pub use documented::{Documented, Fold, Term};
 pub use polar::Estimate;
 pub use rig::Rig;
 pub use signature::{Accumulates, Carrier, Parity, Signature};
+pub use stated::{Given, Stated, StatedEffect, StatedError};
 pub use station::{LEDGER_LOADS, Ledger, Plan, Station};
 
 /// Shaft that an effect sits on.
@@ -158,6 +162,27 @@ pub trait Effect: Sync {
 
     /// Parameters in the contract's names and units.
     fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter>;
+
+    /// The documented error that this effect is a change of.
+    fn folds_into(&self) -> Option<Fold> {
+        None
+    }
+
+    /// Names of the parameters that a file may state; one alone is that in which the trace is linear.
+    fn parameter_names(&self) -> &'static [&'static str];
+
+    /// Shape and amplitudes from stated parameters: the way back from [`Effect::stated`].
+    ///
+    /// # Errors
+    /// [`StatedError`] that names the parameter.
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        stated::linear(given)
+    }
+
+    /// The parameters that fix the trace.
+    fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+        stated::by_parameters(self, rig, shape, beta)
+    }
 }
 
 /// All effects, in the order of the rig from the input encoder to the brake.

@@ -29,4 +29,8 @@ impl Effect for PhasingError {
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("delta_rad", found.beta[0], found.std(0), "rad")]
     }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["delta_rad"]
+    }
 }

@@ -2,7 +2,10 @@
 //! TE = dk ∂f/∂k (`Rig::theta2_slope_over_k`). For one lobe, with tan(f/2) = c tan(θ1/2), c = (1+k)/(1−k): ∂f/∂k = 2 sin f/(1 − k²). Shape [1]: the pair closes
 //! otherwise (a wrong ratio), TE = dk·θ1, which grows with every revolution and returns when the sense turns.
 
-use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+use super::{
+    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
+    StatedEffect, StatedError, Station, stated,
+};
 
 /// Error of the pitch curves' form or closure.
 pub(super) struct PitchCurveError;
@@ -55,5 +58,23 @@ impl Effect for PitchCurveError {
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let unit = if shape[..] == [1.0] { "rad/rad" } else { "" };
         vec![Parameter::number("dk", found.beta[0], found.std(0), unit)]
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["dk", "of"]
+    }
+
+    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        let form_first = rig.eccentricity().is_some();
+        let word = given.word("of", if form_first { &["form", "closure"] } else { &["closure"] }, true)?;
+        let shape = if form_first && word == 0 { 0.0 } else { 1.0 };
+        Ok((vec![shape], vec![given.number("dk")?]))
+    }
+
+    fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+        let mut stated = stated::by_parameters(self, rig, shape, beta);
+        let word = if shape[..] == [1.0] { "closure" } else { "form" };
+        stated.insert("of".to_owned(), Stated::Text(word.to_owned()));
+        stated
     }
 }

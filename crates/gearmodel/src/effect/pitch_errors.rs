@@ -8,7 +8,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station, Value};
+use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shape, Signature, StatedError, Station, Value};
 
 /// Pitch errors of the driver's teeth, flank by flank.
 pub(super) struct PitchErrors;
@@ -95,5 +95,22 @@ impl Effect for PitchErrors {
         [("ccw_mm", ccw), ("cw_mm", cw)]
             .map(|(name, values)| Parameter { name, value: Value::Table(values), std: None, unit: "mm" })
             .into()
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["ccw_mm", "cw_mm"]
+    }
+
+    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        let teeth = teeth(rig);
+        let mut beta = Vec::with_capacity(2 * (teeth - 1));
+        for name in ["ccw_mm", "cw_mm"] {
+            // The waves have no mean: a mean is a backlash, and stands there.
+            let errors_mm = given.table(name, Some(teeth))?;
+            beta.extend(
+                (0..teeth - 1).map(|n| errors_mm.iter().enumerate().map(|(j, x)| x * wave(n, j, teeth)).sum::<f64>()),
+            );
+        }
+        Ok((table(&beta, teeth), beta))
     }
 }

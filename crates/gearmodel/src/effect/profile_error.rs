@@ -6,7 +6,10 @@
 
 use std::f64::consts::TAU;
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+use super::{
+    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
+    StatedError, Station,
+};
 
 /// Profile deviation by mesh orders.
 pub(super) struct ProfileError;
@@ -18,6 +21,21 @@ const A_FLANK: f64 = 1.0;
 /// One deviation, counted from each flank's own tooth 0.
 const OWN_ZERO: f64 = 2.0;
 const ORDERS: usize = 3;
+/// Parameters that a file may state: both flanks, or those driving ccw, then those driving cw.
+const STATED: [&str; 4 * ORDERS] = [
+    "a1_mm",
+    "ph1_rad",
+    "a2_mm",
+    "ph2_rad",
+    "a3_mm",
+    "ph3_rad",
+    "a1_cw_mm",
+    "ph1_cw_rad",
+    "a2_cw_mm",
+    "ph2_cw_rad",
+    "a3_cw_mm",
+    "ph3_cw_rad",
+];
 const NAMES: [[&str; 2]; ORDERS] = [["a1_mm", "ph1_rad"], ["a2_mm", "ph2_rad"], ["a3_mm", "ph3_rad"]];
 
 impl Effect for ProfileError {
@@ -66,5 +84,36 @@ impl Effect for ProfileError {
                 ]
             })
             .collect()
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &STATED
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        let both = !STATED[2 * ORDERS..].iter().any(|name| given.has(name));
+        let waves = if both { ORDERS } else { 2 * ORDERS };
+        let mut beta = Vec::with_capacity(2 * waves);
+        for pair in STATED[..2 * waves].chunks_exact(2) {
+            // a sin(x − φ) = a cos φ sin x − a sin φ cos x.
+            let (a_mm, phase_rad) = (given.number_or(pair[0], 0.0)?, given.number_or(pair[1], 0.0)?);
+            beta.extend([a_mm * phase_rad.cos(), -a_mm * phase_rad.sin()]);
+        }
+        Ok((vec![if both { ALIKE } else { A_FLANK }], beta))
+    }
+
+    fn stated(&self, _rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+        let mut stated = StatedEffect::new();
+        let mut beta = beta.to_vec();
+        if shape[..] == [OWN_ZERO] {
+            // As a deviation a flank: half a pitch later odd orders have the other sign.
+            let other: Vec<f64> = beta.iter().enumerate().map(|(n, b)| if n / 2 % 2 == 0 { -b } else { *b }).collect();
+            beta.extend(other);
+        }
+        for (pair, wave) in STATED.chunks_exact(2).zip(beta.chunks_exact(2)) {
+            stated.insert(pair[0].to_owned(), Stated::Number(wave[0].hypot(wave[1])));
+            stated.insert(pair[1].to_owned(), Stated::Number((-wave[1]).atan2(wave[0])));
+        }
+        stated
     }
 }

@@ -1,7 +1,7 @@
 //! A shaft is softer than documented: the load winds it up, TE = −dir·T·C for the output shaft, −dir·T·C i² for the input
 //! shaft, whose torque is T i and whose twist is seen through the ratio.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Fold, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
 
 /// Compliance of the input or output shaft beyond the documented one.
 pub(super) struct ShaftCompliance(pub(super) Shaft);
@@ -41,5 +41,13 @@ impl Effect for ShaftCompliance {
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("c_rad_per_nm", found.beta[0], found.std(0), "rad/(N.m)")]
+    }
+
+    fn folds_into(&self) -> Option<Fold> {
+        Some(Fold::ShaftCompliance(self.0))
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["c_rad_per_nm"]
     }
 }

@@ -1,7 +1,9 @@
 //! A clamp creeps above a torque: a lag of k·max(0, T − t0) a driver revolution, in the sense of motion, that stays.
 //! TE = −k Σ dir·max(0, T − t0)·revolutions. The shape is [t0].
 
-use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+use super::{
+    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station,
+};
 
 /// Slip of a clamp or coupling.
 pub(super) struct Slip;
@@ -64,5 +66,13 @@ impl Effect for Slip {
             Parameter::number("k_rad_per_rev_nm", found.beta[0], found.std(0), "rad/(rev.N.m)"),
             Parameter::grid("t0_nm", shape[0], "N.m"),
         ]
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["k_rad_per_rev_nm", "t0_nm"]
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        Ok((vec![given.number_in("t0_nm", 0.0, 1e9)?], vec![given.number("k_rad_per_rev_nm")?]))
     }
 }

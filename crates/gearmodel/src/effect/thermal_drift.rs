@@ -1,7 +1,9 @@
 //! The housing warms and the centre distance grows, Δa(t) = da (1 − exp(−t/τ)) since the campaign's first sample:
 //! TE = −dir·Δa(t) tan(α ∓ μ)/r2. The shape is [τ].
 
-use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+use super::{
+    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station,
+};
 
 /// Thermal growth of the centre distance.
 pub(super) struct ThermalDrift;
@@ -48,5 +50,13 @@ impl Effect for ThermalDrift {
 
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("da_mm", found.beta[0], found.std(0), "mm"), Parameter::grid("tau_s", shape[0], "s")]
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["da_mm", "tau_s"]
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        Ok((vec![given.number_in("tau_s", 1e-9, 1e12)?], vec![given.number("da_mm")?]))
     }
 }

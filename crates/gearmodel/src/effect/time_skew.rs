@@ -29,4 +29,8 @@ impl Effect for TimeSkew {
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("dt_s", found.beta[0], found.std(0), "s")]
     }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["dt_s"]
+    }
 }

@@ -3,7 +3,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station, Value};
+use super::{
+    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station, Value,
+};
 
 /// One damaged tooth flank.
 pub(super) struct ToothDamage;
@@ -81,5 +83,16 @@ impl Effect for ToothDamage {
                 unit: "",
             },
         ]
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["tooth", "depth_mm", "width", "flank"]
+    }
+
+    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        let last = f64::from(rig.pair().teeth().0) - 1.0;
+        let flank = if given.word("flank", &["ccw", "cw"], false)? == 0 { 1.0 } else { -1.0 };
+        let shape = vec![given.number_in("tooth", 0.0, last)?.round(), flank, given.number_in("width", 0.01, 2.0)?];
+        Ok((shape, vec![given.number("depth_mm")?]))
     }
 }

@@ -11,7 +11,14 @@
 
 use std::f64::consts::TAU;
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Plan, Rig, Shape, Signature, Station};
+use super::{
+    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
+    StatedError, Station, stated,
+};
+
+/// What excites it, as a file states it, and the kind that it is.
+const EXCITED_BY: [&str; 3] = ["mesh", "turn", "encoder"];
+const KINDS: [f64; 3] = [MESH, TURN, ENCODER];
 
 /// Once a turn of the driver.
 const TURN: f64 = 0.0;
@@ -144,6 +151,25 @@ impl Effect for TorsionalResonance {
         let mut parameters = vec![Parameter::grid("f_hz", f_hz, "Hz"), Parameter::grid("zeta", zeta, "")];
         parameters.extend(found.polar(0).parameters("excitation_rad", "rad"));
         parameters
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["f_hz", "zeta", "excitation_rad", "phase_rad", "excited_by"]
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        let kind = KINDS[given.word("excited_by", &EXCITED_BY, true)?];
+        let shape = vec![kind, given.number_in("f_hz", 1e-6, 1e9)?, given.number_in("zeta", 1e-6, 10.0)?];
+        // The encoder's own swing has no amplitude but what the ratio gives it.
+        Ok((shape, if kind == ENCODER { vec![1.0] } else { given.polar("excitation_rad")? }))
+    }
+
+    fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+        let mut stated = stated::by_parameters(self, rig, shape, beta);
+        let kind = KINDS.iter().position(|kind| shape.first() == Some(kind)).unwrap_or(0);
+        let word = EXCITED_BY[kind];
+        stated.insert("excited_by".to_owned(), Stated::Text(word.to_owned()));
+        stated
     }
 }
 

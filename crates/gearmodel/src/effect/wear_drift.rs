@@ -34,4 +34,8 @@ impl Effect for WearDrift {
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("dj_mm_per_rev_nm", found.beta[0], found.std(0), "mm/(rev.N.m)")]
     }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["dj_mm_per_rev_nm"]
+    }
 }

@@ -178,6 +178,7 @@ pub fn diagnose_runs(
         runs.push(run);
     }
     let mut runs = join(runs);
+    nominal.take_off_effects(&mut runs);
     let points = runs.iter().map(|run| run.points.len()).sum();
     if points < FEWEST_POINTS {
         return Err(GapError::TooShort { recordings, points, needed: FEWEST_POINTS });

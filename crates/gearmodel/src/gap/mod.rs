@@ -12,6 +12,7 @@
 //! | the gap on runs not used for the fit | `shrink` | how far it closes |
 //! | where | `locate` | tables and signature |
 //! | what to do next | `next` | experiments |
+//! | a log against a model, without causes | `verify` | residual against the floor |
 //!
 //! Theory and measured figures: `docs/theory/diagnosis.md`.
 
@@ -29,6 +30,7 @@ pub mod reduce;
 pub mod search;
 pub mod summary;
 pub mod unknown;
+pub mod verify;
 
 mod engine;
 mod events;

@@ -41,6 +41,33 @@ pub struct Condition {
     pub revolutions: f64,
 }
 
+impl Condition {
+    /// Standing still at the campaign's start.
+    #[must_use]
+    pub fn at_rest(direction: Direction, load_nm: f64) -> Self {
+        Self { direction, load_nm, speed_rpm: 0.0, time_s: 0.0, revolutions: 0.0 }
+    }
+
+    /// The station at θ1; the revolutions so far were made under this load and in this sense.
+    #[must_use]
+    pub fn station(&self, rig: &Rig, theta1_rad: f64) -> Station {
+        let sense = self.direction.sign();
+        let mut ledger = Ledger::default();
+        ledger.load_nm[0] = self.load_nm;
+        ledger.signed_rev[0] = sense * self.revolutions;
+        ledger.way_rev[0] = self.revolutions;
+        Station {
+            load_nm: self.load_nm,
+            speed_rad_per_s: sense * self.speed_rpm * std::f64::consts::TAU / 60.0,
+            time_s: self.time_s,
+            way_rev: self.revolutions,
+            net_rev: sense * self.revolutions,
+            ledger,
+            ..rig.station(theta1_rad, rig.pair().theta2(theta1_rad), self.direction)
+        }
+    }
+}
+
 /// Found effects, ready to predict.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
@@ -55,17 +82,7 @@ impl Found {
     #[must_use]
     pub fn te_rad(&self, theta1_rad: f64, at: &Condition) -> (f64, f64) {
         let Some(rig) = &self.rig else { return (0.0, 0.0) };
-        let mut station = rig.station(theta1_rad, rig.pair().theta2(theta1_rad), at.direction);
-        station.load_nm = at.load_nm;
-        station.speed_rad_per_s = at.direction.sign() * at.speed_rpm * std::f64::consts::TAU / 60.0;
-        station.time_s = at.time_s;
-        station.way_rev = at.revolutions;
-        station.net_rev = at.direction.sign() * at.revolutions;
-        let mut ledger = Ledger::default();
-        ledger.load_nm[0] = at.load_nm;
-        ledger.signed_rev[0] = station.net_rev;
-        ledger.way_rev[0] = at.revolutions;
-        station.ledger = ledger;
+        let station = at.station(rig, theta1_rad);
         let (mut te_rad, mut variance) = (0.0, 0.0);
         for found in &self.effects {
             let (te, var) = found.te(rig, &station);

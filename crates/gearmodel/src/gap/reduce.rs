@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use super::line_phase::LinePhase;
 use super::nominal::Nominal;
 use crate::Direction;
+use crate::effect::{Station, Term};
 
 /// Length of a stretch of the driver's turn, rad.
 const STRETCH_RAD: f64 = TAU / 1440.0;
@@ -66,6 +67,7 @@ pub struct Reducer<'a> {
     run: ReducedRun,
     stretch: Stretch,
     lines: LinePhase,
+    documented_lines: Vec<&'a Term>,
 }
 
 /// The stretch being filled, with the pair's kinematics at its first sample.
@@ -84,7 +86,8 @@ impl<'a> Reducer<'a> {
     #[must_use]
     pub fn new(nominal: &'a Nominal, direction: Direction, speed_rpm: f64) -> Self {
         let run = ReducedRun { direction, speed_rpm, points: Vec::new(), within_rad2: 0.0, samples: 0.0 };
-        Self { nominal, run, stretch: Stretch::default(), lines: LinePhase::new(nominal.rig().lines) }
+        let lines = LinePhase::new(nominal.rig().lines);
+        Self { nominal, run, stretch: Stretch::default(), lines, documented_lines: nominal.line_errors().collect() }
     }
 
     /// Takes a sample; one with a gap (NaN) is skipped.
@@ -111,7 +114,13 @@ impl<'a> Reducer<'a> {
         // f about the stretch's start to second order; a quarter degree leaves 0.05 µrad.
         let step = sample.theta1_rad - stretch.origin.theta1_rad;
         let f_rad = stretch.theta2_rad + step * (stretch.ratio + 0.5 * stretch.ratio_slope * step);
-        let deviation = sample.theta2_rad - f_rad;
+        let mut deviation = sample.theta2_rad - f_rad;
+        if !self.documented_lines.is_empty() {
+            let (theta1_rad, theta2_rad) = (sample.theta1_rad, sample.theta2_rad);
+            let at = Station { theta1_rad, theta2_rad, ratio: stretch.ratio, ..Station::default() };
+            let rig = self.nominal.rig();
+            deviation -= self.documented_lines.iter().map(|term| term.te_rad(rig, &at)).sum::<f64>();
+        }
         stretch.sum.time_s += sample.time_s - stretch.origin.time_s;
         stretch.sum.theta1_rad += step;
         stretch.sum.theta2_rad += f_rad - stretch.theta2_rad;

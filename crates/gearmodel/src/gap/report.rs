@@ -1,6 +1,6 @@
 //! From the models seen to the fields of the diagnosis.
 
-use serde_json::{Value as Json, json};
+use serde_json::{Map, Value as Json, json};
 
 use super::*;
 use crate::effect::{Parameter, Value};
@@ -9,6 +9,8 @@ use crate::gap::shrink::{HeldOut, Selection};
 
 /// Flattens what the noise model's own error makes too sure; calibrated on simulated campaigns.
 const SHARPNESS: f64 = 0.85;
+/// How exact parameters are at best, in parts of their value, and phases in rad.
+const LINEARISED: f64 = 0.006;
 /// Members of a group nearer than this have one and the same trace, deg.
 const IDENTICAL_DEG: f64 = 0.2;
 /// A sum of two effects nearer than this to a third looks like it, deg.
@@ -282,7 +284,7 @@ impl Engine<'_> {
 
     fn finding(&self, finding: &Finding) -> EffectFinding {
         let effect = LIBRARY[finding.number];
-        let parameters = finding
+        let mut parameters: Map<String, Json> = finding
             .estimate
             .as_ref()
             .map(|estimate| {
@@ -293,6 +295,11 @@ impl Engine<'_> {
                     .collect()
             })
             .unwrap_or_default();
+        // A rate of events needs the campaign's length, which an effect does not know.
+        if let Some(steps) = parameters.get("steps").and_then(|entry| entry["value"].as_f64()) {
+            let per_rev = steps / self.grid.plan.revolutions.max(f64::MIN_POSITIVE);
+            parameters.insert("per_rev".to_owned(), json!({"value": per_rev, "std": null, "unit": "1/rev"}));
+        }
         EffectFinding {
             name: effect.name().to_owned(),
             probability: finding.probability,
@@ -566,5 +573,14 @@ fn parameter(parameter: &Parameter) -> Json {
         Value::Table(values) => json!(values),
         Value::Text(text) => json!(text),
     };
-    json!({"value": value, "std": parameter.std, "unit": parameter.unit})
+    // Traces are linearised and evaluated at bins: what the fit is sure of to less than that, it is not.
+    let std = match (&parameter.value, parameter.std) {
+        (Value::Number(x), Some(std)) => {
+            let inexact =
+                if parameter.unit == "rad" { LINEARISED.max(LINEARISED * x.abs()) } else { LINEARISED * x.abs() };
+            Some(if std > 0.0 { std.hypot(inexact) } else { std })
+        }
+        (_, std) => std,
+    };
+    json!({"value": value, "std": std, "unit": parameter.unit})
 }

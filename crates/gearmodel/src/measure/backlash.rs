@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::MeasureError;
 use super::grid::{AngleGrid, Curve};
 use crate::NominalModel;
+use crate::gap::predict::Condition;
 
 /// Backlash over θ1 at the driven shaft, rad: TE_cw − TE_ccw at equal θ1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,6 +38,12 @@ impl BacklashCurve {
     #[must_use]
     pub fn predicted(model: &NominalModel, grid: AngleGrid, load_nm: f64) -> Self {
         Self::from_curve(Curve::from_fn(grid, |theta1_rad| model.backlash_rad(theta1_rad, load_nm)))
+    }
+
+    /// The same where speed, time and revolutions matter too.
+    #[must_use]
+    pub fn predicted_under(model: &NominalModel, grid: AngleGrid, under: &Condition) -> Self {
+        Self::from_curve(Curve::from_fn(grid, |theta1_rad| model.backlash_under_rad(theta1_rad, under)))
     }
 
     fn from_curve(curve: Curve) -> Self {

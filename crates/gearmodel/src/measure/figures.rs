@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::grid::{AngleGrid, Curve, mean};
 use super::order::Order;
 use super::run_te::RunTe;
+use crate::gap::predict::Condition;
 use crate::{GearPair, NominalModel};
 
 /// Highest order of θ1 that the figures state.
@@ -66,7 +67,9 @@ fn difference(run: &RunTe, measured: &Curve, model: &NominalModel) -> Curve {
 
 fn predicted_curve(run: &RunTe, model: &NominalModel) -> Curve {
     let conditions = run.conditions();
-    Curve::from_fn(run.grid(), |theta1_rad| model.te_rad(theta1_rad, conditions.direction, conditions.load_nm))
+    let under =
+        Condition { speed_rpm: conditions.speed_rpm, ..Condition::at_rest(conditions.direction, conditions.load_nm) };
+    Curve::from_fn(run.grid(), |theta1_rad| model.te_under_rad(theta1_rad, &under))
 }
 
 impl RunFigures {

@@ -62,6 +62,7 @@ fn plan() -> Plan {
         duration_s: 600.0,
         runs: 12,
         revolutions: 48.0,
+        turns: [1.0, 1.0],
     }
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -31,8 +32,23 @@ def _section(value: Any) -> Any:
 class CalibratedModel:
     """The nominal model with the found effects: predicts TE where nothing was measured; of a group, with its likeliest member."""
 
-    def __init__(self, native: _native.NativeDiagnosis) -> None:
+    def __init__(self, native: _native.NativeDiagnosis, pair: _native.GearPair) -> None:
         self._native = native
+        self._pair = pair
+
+    @property
+    def pair(self) -> _native.GearPair:
+        """The pair with the found effects documented: a nominal model like any other.
+
+        Raises:
+            GeometryError: the sum is no model, as a compliance below zero.
+        """
+        calibrated: _native.GearPair = self._native.calibrated(self._pair)[0]
+        return calibrated
+
+    def to_toml(self, path: str | os.PathLike[str] | None = None) -> str:
+        """The text of a ``pair.toml`` with the found effects under ``[documented]``; written to ``path`` too, where given."""
+        return self.pair.to_toml(path)
 
     def transmission_error(
         self,
@@ -73,8 +89,9 @@ class Diagnosis:
     Every field is plain data: numbers, text, lists, and dicts whose keys are attributes too (``d.gap.before_rad``).
     """
 
-    def __init__(self, native: _native.NativeDiagnosis) -> None:
+    def __init__(self, native: _native.NativeDiagnosis, pair: _native.GearPair) -> None:
         self._native = native
+        self._pair = pair
         self._fields: dict[str, Any] = json.loads(native.to_json())
 
     @property
@@ -147,7 +164,7 @@ class Diagnosis:
     @property
     def model(self) -> CalibratedModel:
         """The nominal model with the found effects."""
-        return CalibratedModel(self._native)
+        return CalibratedModel(self._native, self._pair)
 
     def to_dict(self) -> dict[str, Any]:
         """All fields in plain JSON types; what is not finite is None."""
@@ -198,6 +215,7 @@ def diagnose(
 
     Raises:
         ValueError: names what is missing or wrong: no recording, too little motion, an unknown effect.
+        LogError: a path is no rig log.
 
     >>> import gearmodel as gm, numpy as np
     >>> pair = gm.GearPair.elliptical(module_mm=3, teeth=47, eccentricity=0.3287)
@@ -215,10 +233,21 @@ def diagnose(
         recordings = [recordings]
     elif not isinstance(recordings, Iterable):
         raise TypeError(f"recordings is a {type(recordings).__name__}: a Recording, a path of a log, or a list of them is needed")
+    entries = list(recordings)
+    paths = [os.fspath(entry) for entry in entries if isinstance(entry, (str, os.PathLike))]
+    if paths and len(paths) == len(entries):
+        # Logs are read block by block and share their clock.
+        native, incomplete = _native.diagnose_logs(paths, pair, list(known), list(exclude))
+        for line in incomplete:
+            warnings.warn(line, UserWarning, stacklevel=2)
+        return Diagnosis(native, pair)
     runs: list[_native.Recording] = []
-    for entry in recordings:
+    for entry in entries:
         if isinstance(entry, (str, os.PathLike)):
+            # A log's recordings count their time from its own first sample.
+            if len(paths) > 1:
+                raise ValueError("several logs and recordings together have no clock in common: give logs alone, or recordings alone")
             runs.extend(_native.read_log(os.fspath(entry)).runs)
         else:
             runs.append(entry)
-    return Diagnosis(_native.diagnose(runs, pair, list(known), list(exclude)))
+    return Diagnosis(_native.diagnose(runs, pair, list(known), list(exclude)), pair)

@@ -42,6 +42,7 @@ __all__ = [
     "outline_svg",
     "NativeDiagnosis",
     "diagnose",
+    "diagnose_logs",
 ]
 
 class GeometryError(ValueError): ...
@@ -195,6 +196,8 @@ class GearPair:
     def closure(self) -> float: ...
     @property
     def errors(self) -> Errors: ...
+    @property
+    def effects(self) -> list[str]: ...
     def with_errors(self, errors: Errors) -> GearPair: ...
     @overload
     def theta2(self, theta1: _Scalar) -> float: ...
@@ -232,6 +235,9 @@ class GearPair:
         *,
         tooth_errors: ToothErrors | None = None,
         displacement_mm: tuple[float, float] | None = None,
+        speed_rpm: float = 0.0,
+        time_s: float = 0.0,
+        revolutions: float = 0.0,
     ) -> float: ...
     @overload
     def transmission_error(
@@ -245,6 +251,9 @@ class GearPair:
         *,
         tooth_errors: ToothErrors | None = None,
         displacement_mm: tuple[float, float] | None = None,
+        speed_rpm: float = 0.0,
+        time_s: float = 0.0,
+        revolutions: float = 0.0,
     ) -> _Array: ...
     @overload
     def backlash(
@@ -596,6 +605,7 @@ class MeasuredBacklash:
     def plot(self) -> Any: ...
 
 def backlash_from(ccw: Recording, cw: Recording, pair: GearPair, *, bins: int = 720) -> MeasuredBacklash: ...
+
 @final
 class NativeDiagnosis:
     def to_json(self) -> str: ...
@@ -603,16 +613,13 @@ class NativeDiagnosis:
     def summary(self) -> str: ...
     def curves(self) -> list[tuple[str, _Array, _Array, _Array]]: ...
     def predict(
-        self,
-        theta1: ArrayLike,
-        *,
-        direction: str,
-        load_nm: float,
-        speed_rpm: float,
-        time_s: float,
-        revolutions: float,
+        self, theta1: ArrayLike, *, direction: str, load_nm: float, speed_rpm: float, time_s: float, revolutions: float
     ) -> tuple[Any, Any]: ...
+    def calibrated(self, pair: GearPair) -> tuple[GearPair, list[str]]: ...
 
 def diagnose(
     recordings: Sequence[Recording], pair: GearPair, known: Sequence[str], exclude: Sequence[str]
 ) -> NativeDiagnosis: ...
+def diagnose_logs(
+    paths: Sequence[str], pair: GearPair, known: Sequence[str], exclude: Sequence[str]
+) -> tuple[NativeDiagnosis, list[str]]: ...

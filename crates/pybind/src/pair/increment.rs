@@ -1,6 +1,7 @@
 //! TE and backlash by method: which function of the model answers.
 
 use gearmodel::contact::{ContactError, ContactModel};
+use gearmodel::gap::predict::Condition;
 use gearmodel::increment::published;
 use gearmodel::sensitivity::Parameter;
 use gearmodel::{Direction, NominalModel};
@@ -42,6 +43,16 @@ struct Question {
     /// The contact behind the exact method, and behind single teeth and displaced axes.
     contact: Option<ContactModel>,
     load_nm: f64,
+    /// Driver speed, time and revolutions since the campaign's start: for documented effects.
+    since: Since,
+}
+
+/// What documented effects depend on beside angle, sense and load.
+#[derive(Clone, Copy, Default)]
+struct Since {
+    speed_rpm: f64,
+    time_s: f64,
+    revolutions: f64,
 }
 
 /// A contact of a model with errors of single teeth and displaced axes.
@@ -83,7 +94,7 @@ impl Question {
         } else {
             None
         };
-        Ok(Self { model, method, contact, load_nm })
+        Ok(Self { model, method, contact, load_nm, since: Since::default() })
     }
 
     /// TE at θ1, rad; an angle that is a gap stays one, whatever the method.
@@ -92,16 +103,19 @@ impl Question {
             return Ok(f64::NAN);
         }
         let model = &self.model;
+        let Since { speed_rpm, time_s, revolutions } = self.since;
+        let under = Condition { direction, load_nm: self.load_nm, speed_rpm, time_s, revolutions };
         match (self.method, &self.contact) {
             (Method::Published, _) => Ok(published::te_rad(&model.pair, &model.errors, theta1_rad, direction)),
-            (_, None) => Ok(model.te_rad(theta1_rad, direction, self.load_nm)),
+            (_, None) => Ok(model.te_under_rad(theta1_rad, &under)),
             (method, Some(contact)) => {
                 let unloaded_rad = if method == Method::Exact {
                     contact.te_rad(theta1_rad, direction)?
                 } else {
                     contact.first_order_te_rad(theta1_rad, direction)?
                 };
-                Ok(unloaded_rad + model.windup_rad(&model.pair.at(theta1_rad), direction, self.load_nm))
+                let windup_rad = model.windup_rad(&model.pair.at(theta1_rad), direction, self.load_nm);
+                Ok(unloaded_rad + windup_rad + model.effects_te_rad(theta1_rad, &under))
             }
         }
     }
@@ -162,6 +176,8 @@ impl GearPair {
     ///     tooth_errors: :class:`ToothErrors` of single teeth; not with "published".
     ///     displacement_mm: (dx, dy) of gear 1's axis against gear 2's, mm, constant in the fixed frame; a centre distance
     ///         grown by da is (-da, 0). Not with "published".
+    ///     speed_rpm, time_s, revolutions: driver speed, and time and driver revolutions since the campaign's start, for
+    ///         documented effects that depend on them (time_skew, thermal_drift, slip, ...).
     ///
     /// Returns:
     ///     A float, or a float64 array in the shape of theta1.
@@ -177,7 +193,7 @@ impl GearPair {
     /// >>> print(f"{np.ptp(te) * 1e6:.0f} urad p-p")
     /// 2661 urad p-p
     #[pyo3(signature = (theta1, errors=None, direction="ccw", method="common_normal", load_nm=0.0, relative_to_start=false,
-        *, tooth_errors=None, displacement_mm=None))]
+        *, tooth_errors=None, displacement_mm=None, speed_rpm=0.0, time_s=0.0, revolutions=0.0))]
     fn transmission_error<'py>(
         &self,
         py: Python<'py>,
@@ -189,11 +205,20 @@ impl GearPair {
         relative_to_start: bool,
         tooth_errors: Option<&Bound<'py, ToothErrors>>,
         displacement_mm: Option<(f64, f64)>,
+        speed_rpm: f64,
+        time_s: f64,
+        revolutions: f64,
     ) -> Result<Bound<'py, PyAny>> {
         let theta1 = Numbers::take("theta1", theta1)?;
         let direction = direction.parse::<Direction>()?;
-        let model = self.model_with(errors.map(Bound::get));
-        let question = Question::new(model, method, load_nm, tooth_errors, displacement_mm.unwrap_or_default())?;
+        let model = self.model_with(errors.map(Bound::get))?;
+        let mut question = Question::new(model, method, load_nm, tooth_errors, displacement_mm.unwrap_or_default())?;
+        for (name, value) in [("speed_rpm", speed_rpm), ("time_s", time_s), ("revolutions", revolutions)] {
+            if !value.is_finite() {
+                return Err(InputError::NotFinite { name, value }.into());
+            }
+        }
+        question.since = Since { speed_rpm, time_s, revolutions };
         // The start terms are part of the printed form.
         let from_start = relative_to_start && question.method != Method::Published;
         let start_rad = if from_start { question.te_rad(0.0, direction)? } else { 0.0 };
@@ -233,7 +258,7 @@ impl GearPair {
         displacement_mm: Option<(f64, f64)>,
     ) -> Result<Bound<'py, PyAny>> {
         let theta1 = Numbers::take("theta1", theta1)?;
-        let model = self.model_with(errors.map(Bound::get));
+        let model = self.model_with(errors.map(Bound::get))?;
         let question = Question::new(model, method, load_nm, tooth_errors, displacement_mm.unwrap_or_default())?;
         theta1.try_map_all(py, |theta1_rad| question.backlash_curve_rad(theta1_rad))
     }
@@ -273,7 +298,7 @@ impl GearPair {
         if !load_nm.is_finite() {
             return Err(InputError::Load { load_nm }.into());
         }
-        let model = self.model_with(errors.map(Bound::get));
+        let model = self.model_with(errors.map(Bound::get))?;
         if model.te_derivative(known, 0.0, direction, load_nm).is_none() {
             return Err(InputError::ForeignParameter { given: known.name(), kind: self.model.pair.kind() }.into());
         }

@@ -55,7 +55,7 @@ impl GearPair {
         poisson: f64,
         stiffness_correction: f64,
     ) -> Result<LoadedPair> {
-        let nominal = self.model_with(errors.map(Bound::get));
+        let nominal = self.model_with(errors.map(Bound::get))?;
         let contact = contact_model(&nominal, tooth_errors.map(Bound::get), displacement_mm.unwrap_or_default())?;
         let supports = Supports {
             shaft_compliance_output_rad_per_nm: nominal.errors.shaft_compliance_output_rad_per_nm,

@@ -42,13 +42,18 @@ impl GearPair {
     }
 
     fn from_spec(gears: PairSpec) -> Result<Self> {
-        Self::from_file(PairFile { gears, documented: gearmodel::Errors::default() })
+        Self::from_file(PairFile { gears, documented: gearmodel::Errors::default(), effects: Default::default() })
     }
 
-    /// The model with the pair's own errors, or with those given.
-    pub fn model_with(&self, errors: Option<&Errors>) -> NominalModel {
-        // The constructor of Errors has checked them.
-        NominalModel { pair: self.model.pair.clone(), errors: errors.map_or(self.model.errors, |errors| errors.0) }
+    /// The model with the pair's own errors, or with those given; its documented effects stay.
+    pub fn model_with(&self, errors: Option<&Errors>) -> Result<NominalModel> {
+        Ok(match errors {
+            None => self.model.clone(),
+            Some(errors) => {
+                let file = self.file.with_errors(errors.0);
+                NominalModel::with_effects(self.model.pair.clone(), file.documented, &file.effects)?
+            }
+        })
     }
 }
 
@@ -202,18 +207,27 @@ impl GearPair {
         Errors(self.model.errors)
     }
 
-    /// The same pair with these documented errors in place of its own.
+    /// Names of the documented effects beyond those errors, as a calibrated model has them.
+    #[getter]
+    fn effects(&self) -> Vec<&'static str> {
+        self.model.effects.terms().iter().map(|term| term.effect.name()).collect()
+    }
+
+    /// The same pair with these documented errors in place of its own; documented effects stay.
     ///
     /// >>> import gearmodel as gm
     /// >>> pair = gm.GearPair.circular(module_mm=2, teeth=30).with_errors(gm.Errors(e1_mm=0.02))
     /// >>> pair.errors.e1_mm
     /// 0.02
     fn with_errors(&self, errors: &Errors) -> Result<Self> {
-        Self::from_file(PairFile { gears: self.file.gears.clone(), documented: errors.0 })
+        Self::from_file(self.file.with_errors(errors.0))
     }
 
     /// The call that makes an equal pair.
     fn __repr__(&self) -> String {
+        if !self.file.effects.is_empty() {
+            return format!("GearPair.from_toml({:?})", self.file.to_toml());
+        }
         let pair = match &self.file.gears {
             PairSpec::Elliptical(spec) => {
                 tooth_call("elliptical", &spec.teeth_and_sizes(), &format!("eccentricity={:?}", spec.eccentricity))

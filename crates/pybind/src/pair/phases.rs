@@ -135,7 +135,7 @@ impl GearPair {
         };
         let driver = driver.map_or(Ok(PhaseFreedom::Hub), |given| freedom("driver", given))?;
         let driven = driven.map_or(Ok(PhaseFreedom::Hub), |given| freedom("driven", given))?;
-        let model = self.model_with(errors.map(Bound::get));
+        let model = self.model_with(errors.map(Bound::get))?;
         let phases = py.detach(|| {
             Ok::<_, gearmodel::GeometryError>(
                 PhaseStudy::new(&model.pair, &model.errors, objective)?.optimal(driver, driven),

@@ -2,6 +2,7 @@
 
 mod analyse;
 mod blindtest;
+mod diagnose;
 mod directions;
 mod import;
 mod info;
@@ -11,6 +12,7 @@ mod run;
 mod sim;
 mod simulator;
 mod stop;
+mod verify;
 mod withhold;
 
 use std::process::ExitCode;
@@ -26,7 +28,7 @@ pub enum Exit {
     Failed = 1,
     /// Bad usage or bad input; nothing was moved or written.
     BadInput = 2,
-    /// Done, but the data is incomplete.
+    /// Done, but the data is incomplete or cannot answer the question.
     Incomplete = 3,
     /// Stopped by the operator, log finalised.
     Stopped = 4,
@@ -38,7 +40,7 @@ const EXIT_CODES: &str = "Exit codes:
   0  done
   1  failed: the reason is the last lines on stderr
   2  bad usage or bad input, nothing was moved or written
-  3  done, but the data is incomplete (loss, gap, truncated log)
+  3  done, but the data is incomplete (loss, gap, truncated log) or cannot answer the question
   4  stopped by the operator, log finalised
   5  stopped by a limit, a fault or a lost device, log finalised";
 
@@ -58,6 +60,10 @@ enum Command {
     Replay(replay::Args),
     /// Order spectra, long and short waves, averages and noise floor of logs
     Analyse(analyse::Args),
+    /// Say where model and logs disagree, which effect causes it, and how far the gap shrinks once it is added
+    Diagnose(diagnose::Args),
+    /// Compare logs with a model: the residual of every run against the rig's repeatability
+    Verify(verify::Args),
     /// Say what is in a log
     Info(info::Args),
     /// Make a log from a table of angles (CSV, Parquet)
@@ -88,6 +94,8 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::main(&args),
         Command::Replay(args) => replay::main(&args),
         Command::Analyse(args) => analyse::main(&args),
+        Command::Diagnose(args) => diagnose::main(&args),
+        Command::Verify(args) => verify::main(&args),
         Command::Info(args) => info::main(&args),
         Command::Import(args) => import::main(&args),
         Command::Model(args) => model::main(&args),

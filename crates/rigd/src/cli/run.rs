@@ -39,11 +39,11 @@ pub struct Args {
     /// Sampling of both encoders
     #[arg(long, value_name = "RATE", default_value = "10kHz", value_parser = |text: &str| RATE.parse(text))]
     rate: f64,
-    /// The gear pair and its documented errors [default: the built-in pair]
+    /// The gear pair and its documented errors; the simulated rig is built to it [default: the built-in pair]
     #[arg(long, value_name = "FILE")]
     pair: Option<PathBuf>,
-    /// A model that `rigd diagnose --write-model` saved, in place of --pair
-    #[arg(long, value_name = "FILE", conflicts_with = "pair")]
+    /// A model that `rigd diagnose --write-model` saved: the rig is compared with it in place of --pair
+    #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// The rig [default: the simulated rig]
     #[arg(long, value_name = "FILE")]
@@ -107,6 +107,10 @@ enum Refusal {
     Rate { rate_hz: f64 },
     #[error("--undocumented '{name}' is not an effect of the simulated rig; it has: {known}")]
     Effect { name: String, known: String },
+    #[error(
+        "--model {model}: its gears are not those of the simulated rig, {pair}; give the pair that the model was made from with --pair"
+    )]
+    OtherGears { model: PathBuf, pair: String },
     #[error("profile '{profile}' mixes port \"sim\" with real ports; all three devices are simulated, or none")]
     MixedPorts { profile: String },
 }
@@ -160,8 +164,15 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
     if simulated == 1 || simulated == 2 {
         return Err(Box::new(Refusal::MixedPorts { profile: profile.name }));
     }
-    // The simulated rig's gears are those of the pair, with its documented errors and what is left undocumented.
-    let spec = if profile.in_process() { Some(sim::spec(&model, &args.undocumented)?) } else { None };
+    // The simulated rig's gears are those of the pair, with its documented errors and what is left undocumented; a model is
+    // what it is compared with, and changes nothing on it.
+    let spec = if profile.in_process() {
+        let (plant_toml, plant) = pair::load(args.pair.as_deref())?;
+        same_gears(args, &plant_toml, &pair_toml)?;
+        Some(sim::spec(&plant, &args.undocumented)?)
+    } else {
+        None
+    };
     let setup = Setup {
         path: session::log_path(&args.out, &plan),
         plan,
@@ -173,6 +184,18 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
         quiet: args.quiet,
     };
     Ok((setup, spec))
+}
+
+/// Refuses a model of other gears than the simulated rig has.
+fn same_gears(args: &Args, plant_toml: &str, model_toml: &str) -> Result<(), Refusal> {
+    let gears = |text: &str| gearmodel::PairFile::parse(text).ok().map(|file| file.gears);
+    match &args.model {
+        Some(model) if gears(plant_toml) != gears(model_toml) => Err(Refusal::OtherGears {
+            model: model.clone(),
+            pair: args.pair.as_ref().map_or_else(|| "the built-in pair".into(), |pair| pair.display().to_string()),
+        }),
+        _ => Ok(()),
+    }
 }
 
 fn refuse(profile: &Profile, plan: &Plan) -> Result<(), Refusal> {
@@ -256,6 +279,13 @@ fn warnings(setup: &Setup) -> Vec<String> {
             "the brake slips at {slip} rpm; makers recommend {STICK_SLIP_RPM} rpm or more, below it the torque sticks and slips (a step-up before the brake, brake.step_up, helps)"
         ));
     }
+    if setup.profile.in_process() && !setup.model.effects.is_empty() {
+        let names: Vec<&str> = setup.model.effects.terms().iter().map(|term| term.effect.name()).collect();
+        warnings.push(format!(
+            "the model has {}: the simulated rig has them only where --undocumented puts them there",
+            names.join(", ")
+        ));
+    }
     let drag = setup.profile.brake.drag_nm();
     for load in setup.plan.loads_nm.iter().filter(|load| **load < drag) {
         warnings.push(format!("load {load} N·m is below the brake's drag of {drag} N·m; the drag remains"));
@@ -268,8 +298,7 @@ fn execute(args: &Args, setup: Setup, spec: Option<sim::PlantSpec>) -> Exit {
     match spec {
         None => in_runtime(args, setup, Time::Real, |_| Ok((Links::default(), None))),
         Some(_) if args.time_scale == Some(TimeScale::Real) => in_runtime(args, setup, Time::Real, |setup| {
-            let pair = args.model.as_deref().or(args.pair.as_deref());
-            let simulator = Simulator::start(seed, pair, &args.undocumented)?;
+            let simulator = Simulator::start(seed, args.pair.as_deref(), &args.undocumented)?;
             setup.profile = Profile { name: setup.profile.name.clone(), ..simulator.profile().clone() };
             Ok((Links::default(), Some(simulator)))
         }),
