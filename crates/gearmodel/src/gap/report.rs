@@ -21,7 +21,8 @@ const MOST_MIMICS: usize = 5;
 const TONE_PROBABILITY: f64 = 0.99;
 /// Prior odds of a sub-divisional error.
 const LINE_ODDS: f64 = 0.04;
-/// A remainder under this part of what was found is the found effects' own inexactness.
+/// An effect or a remainder under this part of what was found may be the found effects' own inexactness; under this part of the
+/// floor, the nominal model's.
 const INEXACT: f64 = 0.05;
 
 /// Largest probability of what may be no more than that.
@@ -63,8 +64,9 @@ impl Engine<'_> {
         let before = held_out.errors(&Selection::default());
         let after = held_out.errors(&self.selection(best));
         let found = !best.fit.set.is_empty() || !lines.is_empty() || !self.tones.is_empty();
-        let explained_rad2 = lines.iter().map(|l| l.explained_rad2).sum::<f64>() / self.grid.samples
-            + self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum::<f64>();
+        let lines_rad2 = lines.iter().map(|l| l.explained_rad2).sum::<f64>() / self.grid.samples;
+        let explained_rad2 =
+            lines_rad2 + self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum::<f64>();
         // What the place's own samples scatter, less what the lines explain of it.
         let within_rad2 = self.grid.within_rad2 / self.grid.samples;
         let mut gap = shrink::gap(&before, &after, floor_rad2, within_rad2, explained_rad2, found);
@@ -89,22 +91,23 @@ impl Engine<'_> {
             .filter(|f| f.probability > NAMED && f.block.is_some_and(|b| best.fit.set.contains(&b)))
             .map(|f| f.rms_rad * f.rms_rad)
             .sum::<f64>();
-        let total_rad = (total_rad2 + explained_rad2).sqrt();
+        // What is too small to matter beside what was found, or beside what does not repeat.
+        let least_rad = INEXACT * (total_rad2 + explained_rad2).max(gap.floor_rad * gap.floor_rad).sqrt();
         for finding in &mut findings {
-            if finding.block.is_some() && finding.rms_rad < INEXACT * total_rad {
+            if finding.rms_rad < least_rad {
                 finding.probability = finding.probability.min(INEXACT_PROBABILITY);
             }
         }
         findings.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.number.cmp(&b.number)));
 
-        let Named { groups, verdict, identical } = self.verdict(&findings, &attribution, best, total_rad);
+        let Named { groups, verdict, identical } = self.verdict(&findings, &attribution, best, least_rad);
         // Which of the same traces the search met first says nothing: they are equally probable.
         for (members, probability) in identical {
             for finding in findings.iter_mut().filter(|f| members.contains(&f.number)) {
                 finding.probability = probability / members.len() as f64;
             }
         }
-        let unknown = self.unknown(&attribution, best);
+        let unknown = self.unknown(&attribution, best, gap.floor_rad, lines_rad2);
         let mut verdict = verdict;
         if unknown.probability > NAMED {
             verdict.push(Verdict::Name("unknown".to_owned()));
@@ -312,7 +315,7 @@ impl Engine<'_> {
     }
 
     /// Groups and what is named.
-    fn verdict(&self, findings: &[Finding], attribution: &Attribution, best: &Model, total_rad: f64) -> Named {
+    fn verdict(&self, findings: &[Finding], attribution: &Attribution, best: &Model, least_rad: f64) -> Named {
         let mut identical = Vec::new();
         let mut groups = Vec::new();
         let mut verdict = Vec::new();
@@ -339,11 +342,8 @@ impl Engine<'_> {
                     .sum::<f64>()
                     .min(1.0)
             };
-            let probability = if finding.rms_rad < INEXACT * total_rad && finding.block.is_some() {
-                probability.min(INEXACT_PROBABILITY)
-            } else {
-                probability
-            };
+            let probability =
+                if finding.rms_rad < least_rad { probability.min(INEXACT_PROBABILITY) } else { probability };
             let in_best = finding.block.is_none()
                 || best.fit.set.iter().any(
                     |b| matches!(&self.pool.blocks[*b].cause, Cause::Effect { number, .. } if members.contains(number)),
@@ -370,7 +370,7 @@ impl Engine<'_> {
         Named { groups, verdict, identical }
     }
 
-    fn unknown(&self, attribution: &Attribution, best: &Model) -> Unknown {
+    fn unknown(&self, attribution: &Attribution, best: &Model, floor_rad: f64, lines_rad2: f64) -> Unknown {
         let mut square = 0.0;
         let mut known = 0.0;
         let mut strongest: Option<(f64, &Pattern)> = None;
@@ -389,13 +389,14 @@ impl Engine<'_> {
         }
         square += self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum::<f64>();
         let rms_rad = square.sqrt();
-        if let Some(tone) = self.tones.first() {
+        let least_rad = INEXACT * known.max(floor_rad * floor_rad).max(lines_rad2).sqrt();
+        if let Some(tone) = self.tones.first().filter(|tone| tone.amplitude_rad > least_rad) {
             let pattern = Pattern::Tone { frequency_hz: tone.frequency_hz };
             let location = Some(UnknownLocation { description: pattern.describe(), signature: pattern.signature() });
             return Unknown { probability: TONE_PROBABILITY, rms_rad, location };
         }
         // Effects are linearised and their shapes lie on grids: a small part of them may stay behind.
-        let inexact = square > 0.0 && rms_rad < INEXACT * known.sqrt();
+        let inexact = square > 0.0 && rms_rad < INEXACT * known.max(floor_rad * floor_rad).sqrt();
         let probability = if inexact { attribution.unknown.min(INEXACT_PROBABILITY) } else { attribution.unknown };
         let location = strongest
             .filter(|_| probability > 0.1)
