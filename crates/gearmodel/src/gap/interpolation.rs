@@ -15,6 +15,8 @@ const CELLS: usize = 1 << 18;
 const LINES: std::ops::Range<usize> = 700..CELLS / 3;
 /// Log odds, over all lines looked for, from which a peak is taken for a disc's lines.
 const FOUND_NATS: f64 = 7.0;
+/// Samples are in step with the angle where their own spectrum has a line of this part of its sum.
+const IN_STEP: f64 = 0.15;
 /// The residual is freed of its mean over this part of a turn, or over so many samples where they are sparse.
 const WINDOW_RAD: f64 = TAU / 360.0;
 const WINDOW_SAMPLES: usize = 4;
@@ -26,6 +28,7 @@ pub fn search_lines(parts: &[Recording<'_>], nominal: &Nominal, known: [Option<f
         return known;
     }
     let mut series = [vec![Complex::new(0.0, 0.0); CELLS], vec![Complex::new(0.0, 0.0); CELLS]];
+    let mut seen_at = series.clone();
     let mut power = [0.0; 2];
     for part in parts {
         let columns = part.columns();
@@ -61,11 +64,21 @@ pub fn search_lines(parts: &[Recording<'_>], nominal: &Nominal, known: [Option<f
             {
                 let cell = ((angle_rad / TAU).rem_euclid(1.0) * CELLS as f64) as usize % CELLS;
                 series[encoder][cell].re += gain * deviation;
+                seen_at[encoder][cell].re += 1.0;
                 power[encoder] += gain * gain * deviation * deviation;
             }
         }
     }
     let transform = FftPlanner::new().plan_fft_forward(CELLS);
+    // Samples in step with one of the angles show every low order again at high ones: nothing is known of lines then.
+    for mut places in seen_at {
+        let samples: f64 = places.iter().map(|x| x.re).sum();
+        transform.process(&mut places);
+        let line = places[LINES.start / 4..CELLS / 2].iter().map(|x| x.norm()).fold(0.0, f64::max);
+        if line > IN_STEP * samples {
+            return known;
+        }
+    }
     let mut lines = known;
     for (encoder, mut values) in series.into_iter().enumerate() {
         if known[encoder].is_some() || power[encoder] <= 0.0 {
