@@ -1,6 +1,6 @@
 //! Transmission error and backlash of circular and non-circular gear pairs.
 //!
-//! The crate holds the physics and the analysis of measurements: no input or output, no threads of its own, no async.
+//! The crate holds the physics and the analysis of measurements: no input or output, no async; long sums share the cores (rayon).
 //! Angles are in rad, lengths in mm, torque in N·m unless a name says otherwise.
 //!
 //! Conventions, used by every function, log and plot:
@@ -13,7 +13,7 @@
 //!   same positive sense of θ2, so that backlash = TE_cw − TE_ccw at equal θ1.
 //!
 //! Reading order: [`pitch_curve`] → [`GearPair`] → [`increment`] → [`NominalModel`] (the model, first order) → [`contact`] (the
-//! model, exact) → [`loaded`]; [`recording`] → [`measure`] (the measurement). The theory stands in [`theory`], page by page.
+//! model, exact) → [`loaded`]; [`recording`] → [`measure`] (the measurement) → [`effect`], [`gap`] (what stands between the two). The theory stands in [`theory`], page by page.
 
 pub mod contact;
 mod direction;
