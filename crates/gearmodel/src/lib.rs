@@ -13,7 +13,8 @@
 //!   same positive sense of θ2, so that backlash = TE_cw − TE_ccw at equal θ1.
 //!
 //! Reading order: [`pitch_curve`] → [`GearPair`] → [`increment`] → [`NominalModel`] (the model, first order) → [`contact`] (the
-//! model, exact) → [`loaded`]; [`recording`] → [`measure`] (the measurement) → [`effect`], [`gap`] (what stands between the two). The theory stands in [`theory`], page by page.
+//! model, exact) → [`loaded`]; [`recording`] → [`measure`] (the measurement) → [`effect`], [`gap`] (what stands between the
+//! two). The theory stands in [`theory`], page by page.
 
 pub mod contact;
 mod direction;

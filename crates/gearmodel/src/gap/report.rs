@@ -107,6 +107,7 @@ impl Engine<'_> {
                 finding.probability = probability / members.len() as f64;
             }
         }
+        findings.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.number.cmp(&b.number)));
         let unknown = self.unknown(&attribution, best, gap.floor_rad, lines_rad2);
         let mut verdict = verdict;
         if unknown.probability > NAMED {
