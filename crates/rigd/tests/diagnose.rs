@@ -120,7 +120,10 @@ fn the_effect_is_named_with_its_size_and_the_gap_shrinks() {
     }
     let summary = rigd(&["diagnose", text(log)]);
     let said = String::from_utf8_lossy(&summary.stdout).into_owned();
-    assert!(said.contains("gap ") && said.contains("why   gear2_eccentricity"), "{said}");
+    assert!(
+        said.contains("gap ") && said.contains("why   eccentricity of gear 2") && said.contains("gear2_eccentricity"),
+        "{said}"
+    );
 }
 
 #[test]
