@@ -578,8 +578,8 @@ fn parameter(parameter: &Parameter) -> Json {
     // Traces are linearised and evaluated at bins: what the fit is sure of to less than that, it is not.
     let std = match (&parameter.value, parameter.std) {
         (Value::Number(x), Some(std)) => {
-            let inexact =
-                if parameter.unit == "rad" { LINEARISED.max(LINEARISED * x.abs()) } else { LINEARISED * x.abs() };
+            // A phase has no size of its own.
+            let inexact = if parameter.name.starts_with("ph") { LINEARISED } else { LINEARISED * x.abs() };
             Some(if std > 0.0 { std.hypot(inexact) } else { std })
         }
         (_, std) => std,
