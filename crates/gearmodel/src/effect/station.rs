@@ -1,7 +1,5 @@
 //! Where and when a residual was seen: everything that an effect's trace may depend on.
 
-use crate::Direction;
-
 /// One place in a campaign.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Station {
@@ -31,8 +29,6 @@ pub struct Station {
     pub time_s: f64,
     /// Way of the driver since then in either sense, revolutions.
     pub way_rev: f64,
-    /// Way signed by the sense, revolutions, by load over a threshold is the effects' own affair: see `loads`.
-    pub net_rev: f64,
     /// Run's number.
     pub run: usize,
     /// Signed revolutions driven so far at each of the plan's loads.
@@ -54,20 +50,10 @@ pub struct Ledger {
 }
 
 impl Station {
-    /// The same a little further along the driver's turn, as far as the teeth see it: angle and pitches.
-    #[must_use]
-    pub fn moved(&self, step_rad: f64) -> Self {
-        Self {
-            theta1_rad: self.theta1_rad + step_rad,
-            pitches: self.pitches + step_rad * self.pitches_per_rad,
-            ..*self
-        }
-    }
-
-    /// The driving sense.
-    #[must_use]
-    pub fn direction(&self) -> Direction {
-        if self.sense > 0.0 { Direction::Ccw } else { Direction::Cw }
+    /// Moves it to a little further along the driver's turn than `from`, as far as the teeth see it: angle and pitches.
+    pub fn move_from(&mut self, from: &Self, step_rad: f64) {
+        self.theta1_rad = from.theta1_rad + step_rad;
+        self.pitches = from.pitches + step_rad * from.pitches_per_rad;
     }
 }
 

@@ -364,19 +364,19 @@ impl<'a> Engine<'a> {
         let mut columns = vec![evidence::RESIDUAL];
         columns.extend(&fit.columns);
         let mut chosen = (f64::NEG_INFINITY, noise.run_ratio);
+        let within = noise.within_runs(&self.grid, pool, Some(&columns));
         for level in RUN_RATIOS {
             for waves in RUN_RATIOS {
-                let mut noise = noise.clone();
-                noise.run_ratio = [level, waves];
-                let whitened = noise.whiten_runs(&self.grid, pool, Some(&columns));
-                let log_prior: f64 = [level, waves]
+                let ratio = [level, waves];
+                let whitened = within.between_runs(ratio);
+                let log_prior: f64 = ratio
                     .iter()
                     .zip(FIRST_RUN_RATIO)
                     .map(|(ratio, usual)| -0.5 * ((ratio / usual).ln() / RUN_RATIO_SPREAD).powi(2))
                     .sum();
                 let score = evidence::at_scales(pool, &whitened, fit) + log_prior;
                 if score > chosen.0 {
-                    chosen = (score, noise.run_ratio);
+                    chosen = (score, ratio);
                 }
             }
         }
@@ -393,7 +393,7 @@ impl<'a> Engine<'a> {
             .filter(|n| self.rms_rad(&best.fit, *n) > LARGE * largest)
             .map(|n| best.fit.set[n])
             .collect();
-        let mut few = Pool::new(&self.grid);
+        let mut few = self.pool.beside(&self.grid);
         let causes: Vec<Cause> = large.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
         let mut set = few.add(&self.grid, self.rig, causes);
         if set.len() < large.len() {
@@ -462,7 +462,7 @@ impl<'a> Engine<'a> {
             }
         }
         // Only the winner stays.
-        match few.keep_of(&tried, winner.1) {
+        match few.keep_of(&self.grid, &tried, winner.1) {
             Some(kept) => {
                 set[n] = kept;
                 true
@@ -545,7 +545,7 @@ impl<'a> Engine<'a> {
             self.best.iter().flat_map(|m| &m.fit.set).map(|b| self.pool.blocks[*b].cause.clone()).collect();
         let mut best: Option<(Pattern, f64)> = None;
         for _ in 0..3 {
-            let mut few = Pool::new(&self.grid);
+            let mut few = self.pool.beside(&self.grid);
             let set = few.add(&self.grid, self.rig, found.clone());
             let tried = few.add(&self.grid, self.rig, patterns.iter().cloned().map(Cause::Unknown).collect());
             let whitened = self.noise.whiten(&self.grid, &few);
@@ -579,7 +579,7 @@ impl<'a> Engine<'a> {
         let before = self.best.as_ref().map_or(f64::NEG_INFINITY, |m| m.score);
         // The set alone first, in a pool of its own: most events that are none fail here.
         let causes: Vec<Cause> = set.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
-        let mut few = Pool::new(&self.grid);
+        let mut few = self.pool.beside(&self.grid);
         let own = few.add(&self.grid, self.rig, causes);
         let whitened = self.noise.whiten(&self.grid, &few);
         let Some(fit) = evidence::fit(&few, &whitened, &own, &[]) else { return };

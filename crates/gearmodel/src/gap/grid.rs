@@ -203,7 +203,6 @@ impl Grid {
                 station.way_rev = sum.way / w;
                 station.speed_rad_per_s = speed_sums[key] / w;
                 station.run = index;
-                station.net_rev = books[key].signed_rev.iter().sum::<f64>() / w;
                 station.ledger = Ledger {
                     load_nm: ledger.load_nm,
                     signed_rev: books[key].signed_rev.map(|x| x / w),

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 use super::diagnosis::Gap;
 use super::evidence::{RESIDUAL, ZERO};
 use super::grid::Grid;
-use super::noise::{Noise, WAVES, kind, waves};
+use super::noise::{Noise, WAVES, waves};
 use super::pool::Pool;
 
 /// Resamples of the revolutions for intervals.
@@ -65,7 +65,6 @@ impl HeldOut {
         let units = if by_run { grid.directions.len() } else { grid.revolutions.len() };
         let p = all.len();
         let precision = 1.0 / noise.white_rad2;
-        let lambda: Vec<f64> = (0..WAVES).map(|w| noise.order_rad2[kind(w)].max(1e-16)).collect();
         let mut grams = vec![DMatrix::zeros(p, p); units];
         let mut squares = Vec::new();
         let mut revolutions = Vec::new();
@@ -86,27 +85,20 @@ impl HeldOut {
                 waves(grid.cells[cell].theta1_rad, grid.part_of_cell[cell])[w]
             });
             let c = z * wx * precision;
-            let k = &pool.wave_products[number] * precision;
-            let mut inner = k.clone();
-            for (n, l) in lambda.iter().enumerate() {
-                inner[(n, n)] += 1.0 / l;
-            }
-            if let Some(cholesky) = Cholesky::new(inner) {
-                grams[unit] += &square * precision - c.transpose() * cholesky.solve(&c);
-                run_sums[unit].0 += &k - &k * cholesky.solve(&k);
-                run_sums[unit].1 += &c - &k * cholesky.solve(&c);
+            if let Some(passing) = noise.revolution(&pool.wave_products()[number]) {
+                let lost = &passing.half * &c;
+                grams[unit] += &square * precision - lost.transpose() * &lost;
+                run_sums[unit].0 += &passing.left;
+                run_sums[unit].1 += &passing.on * &c;
             }
             squares.push(square);
             revolutions.push((unit, grid.weight[revolution.places.clone()].iter().sum()));
         }
         if by_run {
-            for (gram, (k, c)) in grams.iter_mut().zip(&run_sums) {
-                let mut inner = k.clone();
-                for (n, l) in lambda.iter().enumerate() {
-                    inner[(n, n)] += 1.0 / (l * noise.run_ratio[usize::from(n > 0)].max(1e-9));
-                }
-                if let Some(cholesky) = Cholesky::new(inner) {
-                    *gram -= c.tr_mul(&cholesky.solve(c));
+            for (gram, (left, c)) in grams.iter_mut().zip(&run_sums) {
+                if let Some(passing) = noise.run(left) {
+                    let lost = &passing.half * c;
+                    *gram -= lost.transpose() * &lost;
                 }
             }
         }
