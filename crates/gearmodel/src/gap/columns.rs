@@ -36,6 +36,14 @@ impl Columns {
         self.slots.len()
     }
 
+    /// Makes room for columns at once.
+    pub(super) fn reserve(&mut self, grid: &Grid, new: &[Values]) {
+        let places = new.iter().filter(|values| matches!(values, Values::Places(_))).count();
+        self.in_cells.reserve((new.len() - places) * grid.cells.len());
+        self.in_places.reserve(places * grid.places.len());
+        self.sums.reserve(places * grid.cells.len());
+    }
+
     pub(super) fn push(&mut self, grid: &Grid, values: Values) {
         match values {
             Values::Cells(x) => {

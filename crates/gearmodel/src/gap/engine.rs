@@ -184,8 +184,8 @@ pub fn diagnose_runs(
         return Err(GapError::TooShort { recordings, points, needed: FEWEST_POINTS });
     }
     let found_lines = take_off_lines(&mut runs, lines.as_ref(), options);
-    let tones = events::take_off_tones(nominal.rig(), &mut runs);
-    let mut engine = Engine::new(nominal.rig(), &runs, tones, options);
+    let (tones, grid) = events::take_off_tones(nominal.rig(), &mut runs);
+    let mut engine = Engine::new(nominal.rig(), grid, tones, options);
     engine.solve();
     engine.report(&found_lines).ok_or(GapError::Singular)
 }
@@ -275,8 +275,7 @@ struct Engine<'a> {
 }
 
 impl<'a> Engine<'a> {
-    fn new(rig: &'a Rig, runs: &[ReducedRun], tones: Vec<Tone>, options: &'a Options) -> Self {
-        let grid = Grid::new(rig, runs);
+    fn new(rig: &'a Rig, grid: Grid, tones: Vec<Tone>, options: &'a Options) -> Self {
         let mut pool = Pool::new(&grid);
         let mut causes = Vec::new();
         for (number, effect) in LIBRARY.iter().copied().enumerate() {

@@ -42,12 +42,17 @@ pub(super) fn panels(
 
 /// AᵀA.
 pub(super) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
-    let n = a.ncols();
-    if n < SMALL {
-        return a.transpose() * a;
-    }
-    let mut product = DMatrix::zeros(n, n);
-    for (start, panel) in panels(a.as_view(), 0, None, a.as_view(), true) {
+    if a.ncols() < SMALL { a.transpose() * a } else { symmetric(a, None) }
+}
+
+/// AᵀWA with the weights of A's rows.
+pub(super) fn weighted(a: &DMatrix<f64>, weight: &[f64]) -> DMatrix<f64> {
+    symmetric(a, Some(weight))
+}
+
+fn symmetric(a: &DMatrix<f64>, weight: Option<&[f64]>) -> DMatrix<f64> {
+    let mut product = DMatrix::zeros(a.ncols(), a.ncols());
+    for (start, panel) in panels(a.as_view(), 0, weight, a.as_view(), true) {
         product.view_mut((start, 0), panel.shape()).copy_from(&panel);
     }
     product.fill_upper_triangle_with_lower_triangle();
@@ -69,6 +74,7 @@ mod tests {
             for (mut row, w) in weighted.row_iter_mut().zip(&weight) {
                 row *= *w;
             }
+            assert_eq!(super::weighted(&a, &weight), weighted.transpose() * &a, "{n} columns");
             let plain = weighted.transpose() * &b;
             for (start, panel) in panels(a.as_view(), 0, Some(&weight), b.as_view(), false) {
                 assert_eq!(panel, plain.rows(start, panel.nrows()));

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
 use super::columns::{Columns, Values};
+use super::gram;
 use super::grid::Grid;
 use super::noise::WAVES;
 use super::unknown::Pattern;
@@ -192,12 +193,13 @@ impl Pool {
         };
         let (stations, weights) =
             if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.base.cell_weight) };
-        let mut raw = vec![0.0; stations.len() * width];
-        let mut part = vec![0.0; width];
-        for (row, station) in raw.chunks_exact_mut(width).zip(stations) {
+        let mut raw = DMatrix::zeros(stations.len(), width);
+        let (mut row, mut part) = (vec![0.0; width], vec![0.0; width]);
+        let width_rad = std::f64::consts::TAU / grid.bins as f64;
+        for (number, station) in stations.iter().enumerate() {
+            row.fill(0.0);
             match cause {
                 Cause::Effect { effect, shape, .. } if effect.sharp() => {
-                    let width_rad = std::f64::consts::TAU / grid.bins as f64;
                     let mut near = *station;
                     for n in 0..SUB_STATIONS {
                         let step = (n as f64 + 0.5) / SUB_STATIONS as f64 - 0.5;
@@ -207,20 +209,17 @@ impl Pool {
                         row.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x / SUB_STATIONS as f64);
                     }
                 }
-                Cause::Effect { effect, shape, .. } => effect.row(rig, shape, station, row),
-                Cause::Unknown(pattern) => pattern.row(station, row),
+                Cause::Effect { effect, shape, .. } => effect.row(rig, shape, station, &mut row),
+                Cause::Unknown(pattern) => pattern.row(station, &mut row),
+            }
+            for (column, value) in row.iter().enumerate() {
+                raw[(number, column)] = *value;
             }
         }
         let total: f64 = weights.iter().sum();
-        let raw = DMatrix::from_row_slice(stations.len(), width, &raw);
         // A constant is the zero's; what is left of a column is its trace.
-        let weight = DVector::from_column_slice(weights);
-        let means = raw.tr_mul(&weight) / total;
-        let mut weighted = raw.clone();
-        for (mut row, w) in weighted.row_iter_mut().zip(weights) {
-            row *= *w;
-        }
-        let covariance = raw.transpose() * &weighted / total - &means * means.transpose();
+        let means = raw.tr_mul(&DVector::from_column_slice(weights)) / total;
+        let covariance = gram::weighted(&raw, weights) / total - &means * means.transpose();
         let scale = DVector::from_fn(width, |n, _| covariance[(n, n)].max(0.0).sqrt());
         if scale.iter().any(|s| !s.is_finite()) || scale.max() <= 0.0 {
             return None;
@@ -258,6 +257,7 @@ impl Pool {
         if new.is_empty() {
             return;
         }
+        self.columns.reserve(grid, &new);
         for values in new {
             self.columns.push(grid, values);
         }
