@@ -20,8 +20,7 @@ mod centre_distance_error;
 mod count_loss;
 mod coupling_misalignment;
 mod documented;
-mod encoder_eccentricity;
-mod encoder_ellipticity;
+mod encoder_disc;
 mod encoder_interpolation;
 mod friction_windup;
 mod gear_eccentricity;
@@ -51,6 +50,10 @@ pub use signature::{Accumulates, Carrier, Parity, Signature};
 pub use stated::{Given, Stated, StatedEffect, StatedError};
 pub use station::{LEDGER_LOADS, Ledger, Plan, Station};
 
+pub(crate) use encoder_interpolation::NAMES as INTERPOLATION;
+
+use encoder_disc::{EncoderDisc, Order};
+
 /// Shaft that an effect sits on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shaft {
@@ -58,6 +61,17 @@ pub enum Shaft {
     Input,
     /// The driven one.
     Output,
+}
+
+impl Shaft {
+    /// What repeats with its angle.
+    #[must_use]
+    pub fn carrier(self) -> Carrier {
+        match self {
+            Self::Input => Carrier::Input,
+            Self::Output => Carrier::Output,
+        }
+    }
 }
 
 /// Values of the parameters in which a trace is not linear; which they are, the effect knows. Empty where there are none.
@@ -196,10 +210,10 @@ pub static LIBRARY: &[&dyn Effect] = &[
     &pitch_errors::PitchErrors,
     &profile_error::ProfileError,
     &tooth_damage::ToothDamage,
-    &encoder_eccentricity::EncoderEccentricity(Shaft::Input),
-    &encoder_eccentricity::EncoderEccentricity(Shaft::Output),
-    &encoder_ellipticity::EncoderEllipticity(Shaft::Input),
-    &encoder_ellipticity::EncoderEllipticity(Shaft::Output),
+    &EncoderDisc { shaft: Shaft::Input, order: Order::Eccentricity },
+    &EncoderDisc { shaft: Shaft::Output, order: Order::Eccentricity },
+    &EncoderDisc { shaft: Shaft::Input, order: Order::Ellipticity },
+    &EncoderDisc { shaft: Shaft::Output, order: Order::Ellipticity },
     &encoder_interpolation::EncoderInterpolation(Shaft::Input),
     &encoder_interpolation::EncoderInterpolation(Shaft::Output),
     &coupling_misalignment::CouplingMisalignment(Shaft::Input),

@@ -1,5 +1,7 @@
 //! Where and when a residual was seen: everything that an effect's trace may depend on.
 
+use super::Shaft;
+
 /// One place in a campaign.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Station {
@@ -50,6 +52,32 @@ pub struct Ledger {
 }
 
 impl Station {
+    /// Angle of a shaft, rad.
+    #[must_use]
+    pub fn angle_rad(&self, shaft: Shaft) -> f64 {
+        match shaft {
+            Shaft::Input => self.theta1_rad,
+            Shaft::Output => self.theta2_rad,
+        }
+    }
+
+    /// Columns gain·sin nθ and gain·cos nθ over a shaft's angle.
+    pub fn wave(&self, shaft: Shaft, order: f64, gain: f64, row: &mut [f64]) {
+        let (sin, cos) = (order * self.angle_rad(shaft)).sin_cos();
+        row[0] = gain * sin;
+        row[1] = gain * cos;
+    }
+
+    /// TE of a reading error sin nθ and cos nθ of a shaft's encoder: the input encoder's is seen through the ratio, with the other
+    /// sign.
+    pub fn reading_error(&self, encoder: Shaft, order: f64, row: &mut [f64]) {
+        let gain = match encoder {
+            Shaft::Input => -self.ratio,
+            Shaft::Output => 1.0,
+        };
+        self.wave(encoder, order, gain, row);
+    }
+
     /// Moves it to a little further along the driver's turn than `from`, as far as the teeth see it: angle and pitches.
     pub fn move_from(&mut self, from: &Self, step_rad: f64) {
         self.theta1_rad = from.theta1_rad + step_rad;

@@ -15,7 +15,7 @@ use super::reduce::{ReducedRun, Reducer, Sample};
 use super::search::{Model, Search};
 use super::unknown::Pattern;
 use super::{events, evidence, interpolation, locate, next, shrink};
-use crate::effect::{Accumulates, Estimate, LIBRARY, Rig, by_name};
+use crate::effect::{Accumulates, Estimate, INTERPOLATION, LIBRARY, Rig, by_name};
 use crate::recording::Recording;
 use crate::{Direction, NominalModel};
 
@@ -194,13 +194,12 @@ pub fn diagnose_runs(
 
 /// Finds sub-divisional errors and takes them off the points, so that they are no noise for the rest.
 fn take_off_lines(runs: &mut [ReducedRun], lines: Option<&LinePhase>, options: &Options) -> Vec<LineError> {
-    let names = ["encoder1_interpolation", "encoder2_interpolation"];
     let mut found: Vec<LineError> = Vec::new();
     if let Some(lines) = lines {
         // The strongest first, and each judged on what the others leave.
         let mut left = lines.clone();
         let open: Vec<(usize, usize)> = (0..2)
-            .filter(|encoder| !options.exclude.iter().any(|name| name == names[*encoder]))
+            .filter(|encoder| !options.exclude.iter().any(|name| name == INTERPOLATION[*encoder]))
             .flat_map(|encoder| [1, 2].map(|order| (encoder, order)))
             .collect();
         while let Some(error) = open
@@ -272,8 +271,6 @@ struct Engine<'a> {
     models: Vec<Model>,
     /// The larger blocks with their shapes moved to where they fit best: a start for the next search.
     large: Option<Vec<usize>>,
-    /// Steps that were found and taken into the pool.
-    events: Vec<Pattern>,
 }
 
 impl<'a> Engine<'a> {
@@ -293,19 +290,7 @@ impl<'a> Engine<'a> {
         pool.add(&grid, rig, causes);
         let noise = Noise::estimate(&grid, &pool, &[]);
         let whitened = Whitened { gram: nalgebra::DMatrix::zeros(0, 0), log_det: 0.0 };
-        Self {
-            rig,
-            tones,
-            grid,
-            pool,
-            options,
-            noise,
-            whitened,
-            best: None,
-            models: Vec::new(),
-            large: None,
-            events: Vec::new(),
-        }
+        Self { rig, tones, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None }
     }
 
     /// Search, look for events, sharpen, estimate the noise anew, until nothing changes.
@@ -389,9 +374,9 @@ impl<'a> Engine<'a> {
     /// small.
     fn sharpen(&mut self) -> bool {
         let Some(best) = &self.best else { return false };
-        let largest = (0..best.fit.set.len()).map(|n| self.rms_rad(&best.fit, n)).fold(0.0, f64::max);
+        let largest = (0..best.fit.set.len()).map(|n| best.fit.rms_rad(&self.pool, n)).fold(0.0, f64::max);
         let large: Vec<usize> = (0..best.fit.set.len())
-            .filter(|n| self.rms_rad(&best.fit, *n) > LARGE * largest)
+            .filter(|n| best.fit.rms_rad(&self.pool, *n) > LARGE * largest)
             .map(|n| best.fit.set[n])
             .collect();
         let mut few = self.pool.beside(&self.grid);
@@ -417,25 +402,18 @@ impl<'a> Engine<'a> {
             let fresh =
                 shaped.iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(cause, _)| cause.clone()).collect();
             let mut added = self.pool.add(&self.grid, self.rig, fresh).into_iter();
-            let mut set: Vec<usize> = known.into_iter().filter_map(|k| k.or_else(|| added.next())).collect();
-            set.sort_unstable();
-            self.large = Some(set);
+            self.large = Some(known.into_iter().filter_map(|k| k.or_else(|| added.next())).collect());
         }
         changed
     }
 
-    /// Block of the pool with the same effect and shape.
+    /// Block of the pool with the same cause.
     fn block_of(&self, cause: &Cause) -> Option<usize> {
-        let Cause::Effect { number, shape, .. } = cause else {
-            return self.pool.blocks.iter().position(|b| match (&b.cause, cause) {
-                (Cause::Unknown(a), Cause::Unknown(b)) => a == b,
-                _ => false,
-            });
-        };
-        self.pool
-            .blocks
-            .iter()
-            .position(|b| matches!(&b.cause, Cause::Effect { number: m, shape: s, .. } if m == number && s == shape))
+        self.pool.blocks.iter().position(|block| match (&block.cause, cause) {
+            (Cause::Unknown(a), Cause::Unknown(b)) => a == b,
+            (Cause::Effect { number: m, shape: a, .. }, Cause::Effect { number: n, shape: b, .. }) => m == n && a == b,
+            _ => false,
+        })
     }
 
     /// Tries the shapes about that of block `n` of a set, and puts the best in its place.
@@ -491,37 +469,22 @@ impl<'a> Engine<'a> {
             .unwrap_or_default()
     }
 
-    /// RMS of the trace of block `n` of a fit, rad.
-    fn rms_rad(&self, fit: &evidence::Fit, n: usize) -> f64 {
-        let place = fit.place(&self.pool, n);
-        fit.mean.rows(place.start, place.len()).norm()
-    }
-
     fn look_for_events(&mut self) -> bool {
         let amplitudes = self.best.as_ref().map(|m| m.fit.amplitudes()).unwrap_or_default();
         let steady = self.steady_amplitudes();
         let found = events::find(&self.grid, &self.pool, &self.noise, &amplitudes, &steady);
         let mut causes = Vec::new();
-        for pattern in found.patterns {
-            if !self.events.contains(&pattern) {
-                self.events.push(pattern.clone());
-                causes.push(Cause::Unknown(pattern));
-            }
-        }
+        causes.extend(found.patterns.into_iter().map(Cause::Unknown));
         let allowed = !self.options.exclude.iter().any(|name| name == "count_loss");
         let count_loss = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.name() == "count_loss");
         if let Some((number, effect)) = count_loss.filter(|_| allowed) {
-            for times_s in found.steps {
-                let known = self.pool.blocks.iter().any(
-                    |b| matches!(&b.cause, Cause::Effect { number: m, shape: s, .. } if *m == number && *s == times_s),
-                );
-                if !known {
-                    let [any, each] = events::STEPS_COST_NATS;
-                    let cost_nats = any + each * times_s.len() as f64;
-                    causes.push(Cause::Effect { effect, number, shape: times_s, cost_nats });
-                }
-            }
+            causes.extend(found.steps.into_iter().map(|times_s| {
+                let [any, each] = events::STEPS_COST_NATS;
+                let cost_nats = any + each * times_s.len() as f64;
+                Cause::Effect { effect, number, shape: times_s, cost_nats }
+            }));
         }
+        causes.retain(|cause| self.block_of(cause).is_none());
         let changed = !causes.is_empty();
         for block in self.pool.add(&self.grid, self.rig, causes) {
             self.weigh_event(block);
@@ -567,7 +530,6 @@ impl<'a> Engine<'a> {
         for block in &added {
             self.weigh_event(*block);
         }
-        self.whitened = self.noise.whiten(&self.grid, &self.pool);
         !added.is_empty()
     }
 
@@ -576,7 +538,6 @@ impl<'a> Engine<'a> {
     fn weigh_event(&mut self, block: usize) {
         let mut set = self.steady_set();
         set.push(block);
-        set.sort_unstable();
         let before = self.best.as_ref().map_or(f64::NEG_INFINITY, |m| m.score);
         // The set alone first, in a pool of its own: most events that are none fail here.
         let causes: Vec<Cause> = set.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();

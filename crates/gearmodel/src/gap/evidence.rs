@@ -53,6 +53,13 @@ impl Fit {
         let first = 1 + self.set[..n].iter().map(|b| pool.blocks[*b].width()).sum::<usize>();
         first..first + pool.blocks[self.set[n]].width()
     }
+
+    /// RMS of the trace of block `n` of the set, rad.
+    #[must_use]
+    pub fn rms_rad(&self, pool: &Pool, n: usize) -> f64 {
+        let place = self.place(pool, n);
+        self.mean.rows(place.start, place.len()).norm()
+    }
 }
 
 fn columns(blocks: &[Block], set: &[usize]) -> Vec<usize> {

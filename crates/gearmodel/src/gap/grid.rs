@@ -268,7 +268,8 @@ fn levels(values: impl Iterator<Item = f64>) -> Vec<f64> {
     found.into_iter().map(|(mean, _)| mean).collect()
 }
 
-fn nearest(levels: &[f64], value: f64) -> usize {
+/// Place of the level nearest to a value; 0 where there is none.
+pub(super) fn nearest(levels: &[f64], value: f64) -> usize {
     (0..levels.len()).min_by(|a, b| (levels[*a] - value).abs().total_cmp(&(levels[*b] - value).abs())).unwrap_or(0)
 }
 

@@ -122,7 +122,6 @@ impl Engine<'_> {
             noise: &self.noise,
             best: &best.fit,
             lines,
-            leading: found.effects.first(),
         });
         let confusability = self.confusability(&findings, best);
         let mut warnings = locate::warnings(&self.grid, &self.noise);
@@ -167,9 +166,7 @@ impl Engine<'_> {
             let own: Vec<usize> = (0..self.pool.blocks.len())
                 .filter(|b| matches!(&self.pool.blocks[*b].cause, Cause::Effect { number: n, .. } if *n == number))
                 .collect();
-            if let Some(encoder) =
-                ["encoder1_interpolation", "encoder2_interpolation"].iter().position(|n| *n == effect.name())
-            {
+            if let Some(encoder) = INTERPOLATION.iter().position(|n| *n == effect.name()) {
                 findings.push(self.line_finding(number, encoder, lines));
                 continue;
             }
@@ -180,64 +177,42 @@ impl Engine<'_> {
                 own.iter().zip(gains).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(b, _)| *b)
             });
             let Some(block) = block else { continue };
-            let in_best = best.fit.set.contains(&block);
-            let score_with = |search: &mut Search<'_>, out: Option<usize>, b: usize| {
+            // The block of the best model that this one would stand in for: itself, or one with the same trace.
+            let stands_for = best.fit.set.iter().copied().find(|b| *b == block).or_else(|| {
+                best.fit
+                    .set
+                    .iter()
+                    .copied()
+                    .find(|b| attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG)
+            });
+            let in_best = stands_for == Some(block);
+            let mut model_with = |out: Option<usize>, b: usize| {
                 let mut set: Vec<usize> = best.fit.set.iter().copied().filter(|x| Some(*x) != out).collect();
                 set.push(b);
                 search.model(set, Some(&best.fit))
             };
-            let twins = if attribution.probability[number] > 0.02 {
-                let reference = if in_best {
-                    Some(best.score)
-                } else {
-                    // Judged beside the block that it would replace.
-                    best.fit
-                        .set
-                        .iter()
-                        .find(|b| attribute::angle_deg(&self.pool, &self.whitened, **b, block) < attribute::SAME_DEG)
-                        .and_then(|b| score_with(search, Some(*b), block))
-                        .map(|m| m.score)
-                };
-                reference.map_or_else(Vec::new, |reference| {
-                    let cell = std::cell::RefCell::new(&mut *search);
-                    let replaced =
-                        if in_best {
-                            Some(block)
-                        } else {
-                            best.fit.set.iter().copied().find(|b| {
-                                attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG
-                            })
-                        };
-                    twins(
-                        &self.pool,
-                        &self.whitened,
-                        attribution,
-                        number,
-                        &|b| score_with(&mut cell.borrow_mut(), replaced, b).map(|m| m.score),
-                        reference.max(best.score - 3.0),
-                    )
-                })
+            let reference = if in_best {
+                Some(best.score)
             } else {
-                Vec::new()
+                stands_for.and_then(|b| model_with(Some(b), block)).map(|m| m.score)
             };
-            // Amplitudes: in the best model, in place of its twin there, or beside it.
-            let model = if in_best {
-                Some(best.clone())
-            } else {
-                let twin = best.fit.set.iter().copied().find(|b| match &self.pool.blocks[*b].cause {
-                    Cause::Effect { number: n, .. } => {
-                        *n == number
-                            || attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG
-                    }
-                    Cause::Unknown(_) => false,
-                });
-                score_with(search, twin, block)
+            let twins = match reference.filter(|_| attribution.probability[number] > 0.02) {
+                Some(reference) => twins(
+                    &self.pool,
+                    &self.whitened,
+                    attribution,
+                    number,
+                    &mut |b| model_with(stands_for, b).map(|m| m.score),
+                    reference.max(best.score - 3.0),
+                ),
+                None => Vec::new(),
             };
+            // Amplitudes: in the best model, in place of its twin or of another shape there, or beside it.
+            let other_shape = best.fit.set.iter().copied().find(|b| own.contains(b));
+            let model = if in_best { Some(best.clone()) } else { model_with(other_shape.or(stands_for), block) };
             let estimate = model.as_ref().and_then(|m| {
                 let n = m.fit.set.iter().position(|b| *b == block)?;
-                let place = m.fit.place(&self.pool, n);
-                let rms: f64 = m.fit.mean.rows(place.start, place.len()).norm();
-                Some((self.raw(m, n), rms))
+                Some((self.raw(m, n), m.fit.rms_rad(&self.pool, n)))
             });
             let shape = match &self.pool.blocks[block].cause {
                 Cause::Effect { shape, .. } => shape.clone(),
@@ -442,7 +417,7 @@ impl Engine<'_> {
         for line in lines {
             let share = line.explained_rad2 / self.grid.samples / reducible;
             explained += share;
-            let effect = ["encoder1_interpolation", "encoder2_interpolation"][line.encoder].to_owned();
+            let effect = INTERPOLATION[line.encoder].to_owned();
             match rows.iter_mut().find(|row| row.effect == effect) {
                 Some(row) => row.share += share,
                 None => rows.push(BudgetRow { effect, share, interval: None }),

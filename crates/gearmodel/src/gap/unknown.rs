@@ -196,17 +196,13 @@ impl Pattern {
             };
             if odd { at.sense * size } else { size }
         };
-        let angle = |shaft: Shaft| if shaft == Shaft::Input { at.theta1_rad } else { at.theta2_rad };
         match self {
             Self::Order { shaft, order, odd, weight, mean } => {
-                let gain = scale(*weight, *mean, *odd);
-                let (sin, cos) = (order * angle(*shaft)).sin_cos();
-                row[0] = gain * sin;
-                row[1] = gain * cos;
+                at.wave(*shaft, *order, scale(*weight, *mean, *odd), row);
             }
             Self::OneSense { shaft, order, sense } => {
                 if at.sense * sense > 0.0 {
-                    let (sin, cos) = (f64::from(*order) * angle(*shaft)).sin_cos();
+                    let (sin, cos) = (f64::from(*order) * at.angle_rad(*shaft)).sin_cos();
                     row[0] = cos;
                     if *order > 0 {
                         row[1] = sin;
@@ -259,7 +255,6 @@ impl Pattern {
     /// Its signature row.
     #[must_use]
     pub fn signature(&self) -> Signature {
-        let carrier_of = |shaft: &Shaft| if *shaft == Shaft::Input { Carrier::Input } else { Carrier::Output };
         let parity_of = |odd: bool| if odd { Parity::Odd } else { Parity::Even };
         let scaled = |carrier, odd, weight| {
             let steady = Signature::steady(carrier, parity_of(odd));
@@ -271,8 +266,8 @@ impl Pattern {
             }
         };
         match self {
-            Self::Order { shaft, odd, weight, .. } => scaled(carrier_of(shaft), *odd, *weight),
-            Self::OneSense { shaft, .. } => Signature::steady(carrier_of(shaft), Parity::OneFlank),
+            Self::Order { shaft, odd, weight, .. } => scaled(shaft.carrier(), *odd, *weight),
+            Self::OneSense { shaft, .. } => Signature::steady(shaft.carrier(), Parity::OneFlank),
             Self::Level { odd, weight, .. } => scaled(Carrier::None, *odd, *weight),
             Self::RunLevels { .. } | Self::Step { .. } => Signature::steady(Carrier::None, Parity::Mixed),
             Self::Tone { .. } => Signature::steady(Carrier::Time, Parity::Mixed),
