@@ -45,7 +45,7 @@ mod wear_drift;
 
 pub use documented::{Documented, Fold, Term};
 pub use polar::Estimate;
-pub use rig::Rig;
+pub use rig::{MeshOrders, Rig};
 pub use signature::{Accumulates, Carrier, Parity, Signature};
 pub use stated::{Given, Stated, StatedEffect, StatedError};
 pub use station::{LEDGER_LOADS, Ledger, Plan, Station};
