@@ -48,7 +48,7 @@ pub use polar::Estimate;
 pub use rig::{MeshOrders, Rig};
 pub use signature::{Accumulates, Carrier, Parity, Signature};
 pub use stated::{Given, Stated, StatedEffect, StatedError};
-pub use station::{LEDGER_LOADS, Ledger, Plan, Station};
+pub use station::{Grain, LEDGER_LOADS, Ledger, Plan, Station};
 
 pub(crate) use encoder_interpolation::NAMES as INTERPOLATION;
 
@@ -164,9 +164,9 @@ pub trait Effect: Sync {
         false
     }
 
-    /// True where the trace jumps with the teeth: it is then averaged over an angle bin, as the samples are.
-    fn sharp(&self) -> bool {
-        false
+    /// How fine the trace is: it is averaged over an angle bin as the samples are.
+    fn grain(&self) -> Grain {
+        Grain::Smooth
     }
 
     /// True where a negative amplitude has no meaning.

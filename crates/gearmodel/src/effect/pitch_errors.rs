@@ -8,7 +8,9 @@
 
 use std::f64::consts::TAU;
 
-use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shape, Signature, StatedError, Station, Value};
+use super::{
+    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Rig, Shape, Signature, StatedError, Station, Value,
+};
 
 /// Pitch errors of the driver's teeth, flank by flank.
 pub(super) struct PitchErrors;
@@ -64,8 +66,8 @@ impl Effect for PitchErrors {
         Some(table(beta, teeth(rig)))
     }
 
-    fn sharp(&self) -> bool {
-        true
+    fn grain(&self) -> Grain {
+        Grain::Sharp
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {

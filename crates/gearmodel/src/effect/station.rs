@@ -7,6 +7,8 @@ use super::Shaft;
 pub struct Station {
     /// Driver angle θ1, rad.
     pub theta1_rad: f64,
+    /// Standard deviation of the driver angles of the samples that it stands for, rad.
+    pub spread_rad: f64,
     /// Driven angle, rad.
     pub theta2_rad: f64,
     /// Driving sense: +1 ccw, −1 cw.
@@ -82,6 +84,30 @@ impl Station {
     pub fn move_from(&mut self, from: &Self, step_rad: f64) {
         self.theta1_rad = from.theta1_rad + step_rad;
         self.pitches = from.pitches + step_rad * from.pitches_per_rad;
+    }
+}
+
+/// How fine the trace of an effect is against the stretches of angle over which samples are averaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grain {
+    /// As good as constant over them: taken at their middle.
+    Smooth,
+    /// Bent over them: taken on both sides of the middle, which gives the mean to the third order.
+    Fine,
+    /// Jumps: taken at many places.
+    Sharp,
+}
+
+impl Grain {
+    /// Where a trace is taken, in standard deviations of the samples' angles.
+    #[must_use]
+    pub fn places(self) -> &'static [f64] {
+        match self {
+            Self::Smooth => &[0.0],
+            Self::Fine => &[-1.0, 1.0],
+            // Middles of six equal parts of a box with this standard deviation, which is √12 wide.
+            Self::Sharp => &[-1.443_376, -0.866_025, -0.288_675, 0.288_675, 0.866_025, 1.443_376],
+        }
     }
 }
 

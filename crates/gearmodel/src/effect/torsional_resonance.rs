@@ -15,7 +15,7 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
+    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
     StatedError, Station, stated,
 };
 
@@ -48,6 +48,12 @@ const ENCODER: f64 = 2.0;
 const ENCODER_ORDERS: [f64; 3] = [6.0, 15.0, 100.0];
 /// Damping ratio of the encoder's coupling tried first: far below the resonance it does not show.
 const ENCODER_ZETA: f64 = 0.05;
+/// Lowest and highest resonance tried, in parts of the excitation's highest frequency, and ratios of neighbours.
+const FREQUENCIES: [f64; 2] = [0.4, 3.3];
+const TURN_RATIO: f64 = 1.35;
+const MESH_RATIO: f64 = 1.07;
+/// Damping ratio tried first where the mesh rings it.
+const MESH_ZETA: f64 = 0.05;
 /// How far the amplitude of kind 2 may be from 1, as a factor of f.
 const CONSISTENT: f64 = 0.01;
 
@@ -88,15 +94,15 @@ impl Effect for TorsionalResonance {
         if *high < 1.2 * low {
             return Vec::new();
         }
-        let mut shapes = Vec::new();
-        for (kind, per_turn) in [(TURN, 1.0), (MESH, f64::from(rig.pair().teeth().0))] {
-            if per_turn == 0.0 {
-                continue;
-            }
-            for n in 0..8 {
-                let f_hz = per_turn * high / TAU * 0.4 * 1.35_f64.powi(n);
-                shapes.extend([0.02, 0.1].map(|zeta| vec![kind, f_hz, zeta, 0.0]));
-            }
+        let mut shapes: Vec<Shape> = Vec::new();
+        let turn_hz = high / TAU;
+        for f_hz in frequencies(turn_hz, TURN_RATIO) {
+            shapes.extend([0.02, 0.1].map(|zeta| vec![TURN, f_hz, zeta, 0.0]));
+        }
+        // Where the mesh frequency sweeps over it, a resonance rings on in its own phase: the grid must be as fine as it is narrow.
+        let teeth = f64::from(rig.pair().teeth().0);
+        if teeth > 0.0 {
+            shapes.extend(frequencies(teeth * turn_hz, MESH_RATIO).map(|f_hz| vec![MESH, f_hz, MESH_ZETA, 0.0]));
         }
         if !rig.ratio_orders().is_empty() {
             shapes.extend(ENCODER_ORDERS.map(|order| vec![ENCODER, order * high / TAU, ENCODER_ZETA]));
@@ -142,6 +148,10 @@ impl Effect for TorsionalResonance {
     /// Of kind 2, whose amplitude is (f/f_true)²; the others have two amplitudes, of either sign.
     fn one_sided(&self) -> bool {
         true
+    }
+
+    fn grain(&self) -> Grain {
+        Grain::Fine
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
@@ -213,6 +223,12 @@ impl Effect for TorsionalResonance {
         }
         stated
     }
+}
+
+/// Resonances tried about the excitation's highest frequency.
+fn frequencies(highest_hz: f64, ratio: f64) -> impl Iterator<Item = f64> {
+    let count = ((FREQUENCIES[1] / FREQUENCIES[0]).ln() / ratio.ln()).ceil() as i32;
+    (0..=count).map(move |n| FREQUENCIES[0] * highest_hz * ratio.powi(n))
 }
 
 /// Steady lead of the output encoder's disc over its shaft, rad (kind 2).

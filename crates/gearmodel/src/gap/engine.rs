@@ -6,15 +6,16 @@ use super::attribute::{self, Attribution, twins};
 use super::diagnosis::{Confusability, Diagnosis, EffectFinding, Group, Unknown, UnknownLocation, Verdict};
 use super::events::Tone;
 use super::grid::Grid;
+use super::knocks::Knocks;
 use super::line_phase::{LineError, LinePhase};
 use super::noise::{FIRST_RUN_RATIO, Noise, Whitened};
 use super::nominal::Nominal;
 use super::pool::{Cause, Pool};
 use super::predict::{Found, FoundEffect};
 use super::reduce::{ReducedRun, Reducer, Sample};
-use super::search::{Model, Search};
+use super::search::{Allowed, Model, Search};
 use super::unknown::Pattern;
-use super::{events, evidence, interpolation, locate, next, shrink};
+use super::{events, evidence, interpolation, knocks, locate, next, shrink};
 use crate::effect::{Accumulates, Estimate, INTERPOLATION, LIBRARY, Rig, by_name};
 use crate::recording::Recording;
 use crate::{Direction, NominalModel};
@@ -186,8 +187,13 @@ pub fn diagnose_runs(
         return Err(GapError::TooShort { recordings, points, needed: FEWEST_POINTS });
     }
     let found_lines = take_off_lines(&mut runs, lines.as_ref(), options);
-    let (tones, grid) = events::take_off_tones(nominal.rig(), &mut runs);
-    let mut engine = Engine::new(nominal.rig(), grid, tones, options);
+    let mut grid = Grid::new(nominal.rig(), &runs);
+    let knocks = knocks::take_off(&grid, &mut runs);
+    if knocks.is_some() {
+        grid = Grid::new(nominal.rig(), &runs);
+    }
+    let (tones, grid) = events::take_off_tones(nominal.rig(), &mut runs, grid);
+    let mut engine = Engine::new(nominal.rig(), grid, Aside { tones, knocks }, options);
     engine.solve();
     engine.report(&found_lines).ok_or(GapError::Singular)
 }
@@ -258,10 +264,28 @@ fn join(mut runs: Vec<ReducedRun>) -> Vec<ReducedRun> {
     joined
 }
 
+/// What was taken off the points before anything was fitted.
+struct Aside {
+    tones: Vec<Tone>,
+    knocks: Option<Knocks>,
+}
+
+impl Aside {
+    /// Its mean square, rad².
+    fn mean_square_rad2(&self) -> f64 {
+        let tones: f64 = self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum();
+        tones + self.knocks.map_or(0.0, |knocks| knocks.mean_square_rad2)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.tones.is_empty() && self.knocks.is_none()
+    }
+}
+
 /// The state of a diagnosis.
 struct Engine<'a> {
     rig: &'a Rig,
-    tones: Vec<Tone>,
+    aside: Aside,
     grid: Grid,
     pool: Pool,
     options: &'a Options,
@@ -274,7 +298,7 @@ struct Engine<'a> {
 }
 
 impl<'a> Engine<'a> {
-    fn new(rig: &'a Rig, grid: Grid, tones: Vec<Tone>, options: &'a Options) -> Self {
+    fn new(rig: &'a Rig, grid: Grid, aside: Aside, options: &'a Options) -> Self {
         let mut pool = Pool::new(&grid);
         let mut causes = Vec::new();
         for (number, effect) in LIBRARY.iter().copied().enumerate() {
@@ -290,7 +314,7 @@ impl<'a> Engine<'a> {
         pool.add(&grid, rig, causes);
         let noise = Noise::estimate(&grid, &pool, &[]);
         let whitened = Whitened { gram: nalgebra::DMatrix::zeros(0, 0), log_det: 0.0 };
-        Self { rig, tones, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None }
+        Self { rig, aside, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None }
     }
 
     /// Search, look for events, sharpen, estimate the noise anew, until nothing changes.
@@ -326,7 +350,7 @@ impl<'a> Engine<'a> {
         let mut search = Search::new(&self.pool, &self.whitened, &self.options.known);
         let mut best = search.run();
         for set in starts {
-            if let Some(other) = search.climb(set, true)
+            if let Some(other) = search.climb(set, Allowed::All)
                 && best.as_ref().is_none_or(|b| other.score > b.score)
             {
                 best = Some(other);
@@ -553,7 +577,7 @@ impl<'a> Engine<'a> {
             return;
         }
         let whitened = noise.whiten(&self.grid, &self.pool);
-        let with_event = Search::new(&self.pool, &whitened, &self.options.known).climb(set, true);
+        let with_event = Search::new(&self.pool, &whitened, &self.options.known).climb(set, Allowed::All);
         if let Some(model) = with_event.filter(|model| model.score > before) {
             self.best = Some(model);
             self.noise = noise;

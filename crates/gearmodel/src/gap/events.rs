@@ -391,9 +391,8 @@ pub struct Tone {
 
 /// Finds tones in what differs between revolutions of a condition, and takes them off the points. With them the grid of what is
 /// left.
-pub fn take_off_tones(rig: &Rig, runs: &mut [ReducedRun]) -> (Vec<Tone>, Grid) {
+pub fn take_off_tones(rig: &Rig, runs: &mut [ReducedRun], mut grid: Grid) -> (Vec<Tone>, Grid) {
     let mut tones = Vec::new();
-    let mut grid = Grid::new(rig, runs);
     while tones.len() < MOST_TONES
         && let Some(frequency_hz) = strongest_tone(&grid, runs)
         && let Some(tone) = take_off_tone(runs, &grid, frequency_hz)

@@ -13,7 +13,7 @@ use super::pool::{Block, Pool};
 const SCALES: usize = 11;
 const SMALLEST_SCALE_RAD: f64 = 1e-6;
 /// Blocks wider than this are scanned on a coarser grid of scales: 2, 8, 32, 128 µrad.
-const WIDE: usize = 16;
+pub(super) const WIDE: usize = 16;
 const WIDE_SCALES: i32 = 4;
 /// What the freedom of a scale costs: as on the grid, a third of whose points fit.
 const SCALE_COST: f64 = 1.3;

@@ -70,6 +70,23 @@ struct Sum {
     rho2: f64,
     load: f64,
     way: f64,
+    /// Driver's way from the bin's middle, and its square over the samples.
+    off: f64,
+    off2: f64,
+}
+
+impl Sum {
+    /// Mean way of the samples from the bin's middle, rad, and its variance, rad².
+    fn spread(&self) -> (f64, f64) {
+        let mean = self.off / self.weight;
+        (mean, (self.off2 / self.weight - mean * mean).max(0.0))
+    }
+
+    fn add_spread(&mut self, weight: f64, off: f64, variance: f64) {
+        self.weight += weight;
+        self.off += weight * off;
+        self.off2 += weight * (off * off + variance);
+    }
 }
 
 impl Grid {
@@ -164,6 +181,7 @@ impl Grid {
             let way_rev = (point.theta1_rad - origin_rad).abs() / TAU;
             let turn = (way_rev as usize).min(frame.turns - 1);
             let bin = (((way_rev - turn as f64).clamp(0.0, 1.0) * bins as f64) as usize).min(bins - 1);
+            let turn_rev = turn as f64;
             let turn = turn / frame.merge;
             let key = turn * bins + bin;
             keys.push(key);
@@ -171,7 +189,8 @@ impl Grid {
             // Means of the first turn's angles stand for all turns of a merged revolution.
             let turns_away = ((point.theta1_rad - origin_rad) / TAU).trunc() * f64::from(u8::from(frame.merge > 1));
             let sum = &mut sums[key];
-            sum.weight += w;
+            let middle_rev = turn_rev + (bin as f64 + 0.5) / bins as f64;
+            sum.add_spread(w, (way_rev - middle_rev) * TAU, point.spread_rad2);
             sum.time += w * (point.time_s - frame.start_s);
             sum.theta1 += w * (point.theta1_rad - TAU * turns_away);
             sum.theta2 += w * (point.theta2_rad - TAU * turns_away * rig.pair().closure());
@@ -188,6 +207,9 @@ impl Grid {
         let steady = frame.closes && steady_load(&run.points);
         let mut place_of_key = vec![usize::MAX; sums.len()];
         let mut cell_of_bin = vec![usize::MAX; bins];
+        let first_cell = self.cells.len();
+        // Way of a cell's first station from the bin's middle, and the ways of all of its places.
+        let mut cell_sums: Vec<(f64, Sum)> = Vec::new();
         for revolution in 0..revolutions {
             let first = self.places.len();
             for (bin, cell) in cell_of_bin.iter_mut().enumerate() {
@@ -203,6 +225,8 @@ impl Grid {
                 station.way_rev = sum.way / w;
                 station.speed_rad_per_s = speed_sums[key] / w;
                 station.run = index;
+                let (off_rad, variance_rad2) = sum.spread();
+                station.spread_rad = variance_rad2.sqrt();
                 station.ledger = Ledger {
                     load_nm: ledger.load_nm,
                     signed_rev: books[key].signed_rev.map(|x| x / w),
@@ -212,7 +236,9 @@ impl Grid {
                     *cell = self.cells.len();
                     self.cells.push(station);
                     self.part_of_cell.push((bin as f64 + 0.5) / bins as f64);
+                    cell_sums.push((off_rad, Sum::default()));
                 }
+                cell_sums[*cell - first_cell].1.add_spread(w, off_rad, variance_rad2);
                 place_of_key[key] = self.places.len();
                 self.places.push(station);
                 self.cell_of.push(*cell);
@@ -225,6 +251,13 @@ impl Grid {
                 let coverage = places.len() as f64 / bins as f64;
                 self.revolutions.push(Revolution { run: index, places, coverage });
             }
+        }
+        // A cell stands for its places of all revolutions: where their samples lie in the mean, and as far about it as they do.
+        for (cell, (first_rad, sum)) in self.cells[first_cell..].iter_mut().zip(cell_sums) {
+            let (mean_rad, variance_rad2) = sum.spread();
+            let first = *cell;
+            cell.move_from(&first, run.direction.sign() * (mean_rad - first_rad));
+            cell.spread_rad = variance_rad2.sqrt();
         }
         self.place_of_point[number] = keys.into_iter().map(|key| place_of_key[key]).collect();
     }

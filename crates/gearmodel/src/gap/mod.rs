@@ -7,7 +7,7 @@
 //! | columns of all effects and unknown patterns | `pool`, `columns`, `unknown` | sums from which every fit is made |
 //! | what does not repeat | `noise` | covariance by order, revolution and run |
 //! | how probable is a set of effects | `evidence`, `search` | models with their posterior |
-//! | tones, steps | `events` | what angle does not carry |
+//! | tones, steps, knocks | `events`, `knocks` | what angle does not carry |
 //! | probabilities, groups | `attribute` | verdict |
 //! | the gap on runs not used for the fit | `shrink` | how far it closes |
 //! | where | `locate` | tables and signature |
@@ -37,6 +37,7 @@ mod engine;
 mod events;
 mod gram;
 mod interpolation;
+mod knocks;
 mod locate;
 mod next;
 mod shrink;

@@ -14,7 +14,7 @@ use super::gram;
 use super::grid::Grid;
 use super::noise::WAVES;
 use super::unknown::Pattern;
-use crate::effect::{Effect, Rig, Shape};
+use crate::effect::{Effect, Grain, Rig, Shape};
 
 /// What a block of columns stands for.
 #[derive(Clone)]
@@ -102,8 +102,6 @@ impl Base {
     }
 }
 
-/// Stations over a bin at which a trace that jumps is averaged.
-const SUB_STATIONS: usize = 6;
 /// Traces smaller than this part of a block's largest direction are not seen under the plan.
 const UNSEEN: f64 = 1e-5;
 
@@ -195,22 +193,21 @@ impl Pool {
             if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.base.cell_weight) };
         let mut raw = DMatrix::zeros(stations.len(), width);
         let (mut row, mut part) = (vec![0.0; width], vec![0.0; width]);
-        let width_rad = std::f64::consts::TAU / grid.bins as f64;
+        let places = match cause {
+            Cause::Effect { effect, .. } => effect.grain().places(),
+            Cause::Unknown(_) => Grain::Smooth.places(),
+        };
         for (number, station) in stations.iter().enumerate() {
             row.fill(0.0);
-            match cause {
-                Cause::Effect { effect, shape, .. } if effect.sharp() => {
-                    let mut near = *station;
-                    for n in 0..SUB_STATIONS {
-                        let step = (n as f64 + 0.5) / SUB_STATIONS as f64 - 0.5;
-                        near.move_from(station, step * width_rad);
-                        part.fill(0.0);
-                        effect.row(rig, shape, &near, &mut part);
-                        row.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x / SUB_STATIONS as f64);
-                    }
+            let mut near = *station;
+            for place in places {
+                near.move_from(station, place * station.spread_rad);
+                part.fill(0.0);
+                match cause {
+                    Cause::Effect { effect, shape, .. } => effect.row(rig, shape, &near, &mut part),
+                    Cause::Unknown(pattern) => pattern.row(&near, &mut part),
                 }
-                Cause::Effect { effect, shape, .. } => effect.row(rig, shape, station, &mut row),
-                Cause::Unknown(pattern) => pattern.row(station, &mut row),
+                row.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x / places.len() as f64);
             }
             for (column, value) in row.iter().enumerate() {
                 raw[(number, column)] = *value;

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::*;
-use crate::effect::{Parameter, Value};
+use crate::effect::{Carrier, Parameter, Parity, Signature, Value};
 use crate::gap::line_phase::LineError;
 use crate::gap::shrink::{HeldOut, Selection};
 
@@ -17,8 +17,8 @@ const IDENTICAL_DEG: f64 = 0.2;
 const MIMIC_DEG: f64 = 4.0;
 /// Most warnings of such sums.
 const MOST_MIMICS: usize = 5;
-/// Probability of a tone that was found over all frequencies.
-const TONE_PROBABILITY: f64 = 0.99;
+/// Probability of a tone that was found over all frequencies, and of knocks far out of the scatter.
+const EVENT_PROBABILITY: f64 = 0.99;
 /// Prior odds of a sub-divisional error.
 const LINE_ODDS: f64 = 0.04;
 /// An effect or a remainder under this part of what was found may be the found effects' own inexactness; under this part of the
@@ -26,7 +26,7 @@ const LINE_ODDS: f64 = 0.04;
 const INEXACT: f64 = 0.05;
 
 /// Largest probability of what may be no more than that.
-const INEXACT_PROBABILITY: f64 = 0.2;
+const INEXACT_PROBABILITY: f64 = 0.02;
 
 /// What is named, and groups whose members have one and the same trace with the probability that one of them is there.
 struct Named {
@@ -63,10 +63,9 @@ impl Engine<'_> {
         let floor_rad2 = held_out.floor_rad2(&self.grid, &self.noise);
         let before = held_out.errors(&Selection::default());
         let after = held_out.errors(&self.selection(best));
-        let found = !best.fit.set.is_empty() || !lines.is_empty() || !self.tones.is_empty();
+        let found = !best.fit.set.is_empty() || !lines.is_empty() || !self.aside.is_empty();
         let lines_rad2 = lines.iter().map(|l| l.explained_rad2).sum::<f64>() / self.grid.samples;
-        let explained_rad2 =
-            lines_rad2 + self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum::<f64>();
+        let explained_rad2 = lines_rad2 + self.aside.mean_square_rad2();
         // What the place's own samples scatter, less what the lines explain of it.
         let within_rad2 = self.grid.within_rad2 / self.grid.samples;
         let mut gap = shrink::gap(&before, &after, floor_rad2, within_rad2, explained_rad2, found);
@@ -363,13 +362,24 @@ impl Engine<'_> {
                 Cause::Effect { .. } => known += size,
             }
         }
-        square += self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum::<f64>();
+        square += self.aside.mean_square_rad2();
         let rms_rad = square.sqrt();
         let least_rad = INEXACT * known.max(floor_rad * floor_rad).max(lines_rad2).sqrt();
-        if let Some(tone) = self.tones.first().filter(|tone| tone.amplitude_rad > least_rad) {
+        if let Some(knocks) = self.aside.knocks.filter(|knocks| knocks.mean_square_rad2.sqrt() > least_rad) {
+            let description = format!(
+                "{} knocks or lost readings of up to {:.0} urad, the first at {:.2} s",
+                knocks.count,
+                knocks.peak_rad * 1e6,
+                knocks.first_s
+            );
+            let signature = Signature::steady(Carrier::None, Parity::Mixed);
+            let location = Some(UnknownLocation { description, signature });
+            return Unknown { probability: EVENT_PROBABILITY, rms_rad, location };
+        }
+        if let Some(tone) = self.aside.tones.first().filter(|tone| tone.amplitude_rad > least_rad) {
             let pattern = Pattern::Tone { frequency_hz: tone.frequency_hz };
             let location = Some(UnknownLocation { description: pattern.describe(), signature: pattern.signature() });
-            return Unknown { probability: TONE_PROBABILITY, rms_rad, location };
+            return Unknown { probability: EVENT_PROBABILITY, rms_rad, location };
         }
         // Effects are linearised and their shapes lie on grids: a small part of them may stay behind.
         let inexact = square > 0.0 && rms_rad < INEXACT * known.max(floor_rad * floor_rad).sqrt();

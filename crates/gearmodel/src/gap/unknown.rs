@@ -10,6 +10,9 @@ const LEAST_TURN: f64 = 0.9;
 /// Highest order of waves that do not close with the turn.
 const HIGHEST_WANDERING: f64 = 3.5;
 
+/// Orders of a smooth pattern.
+const SMOOTH_ORDERS: usize = 10;
+
 /// How a pattern scales with the condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
@@ -45,6 +48,11 @@ pub enum Pattern {
         shaft: Shaft,
         /// Order; 0 is a constant.
         order: u32,
+        /// Sense.
+        sense: f64,
+    },
+    /// All low orders of the driver in one sense only: whatever is smooth over its turn.
+    Smooth {
         /// Sense.
         sense: f64,
     },
@@ -114,6 +122,9 @@ impl Pattern {
         if both {
             patterns.push(Self::Level { odd: true, weight: Weight::One, mean: 1.0 });
             for sense in [1.0, -1.0] {
+                if shafts.contains(&Shaft::Input) {
+                    patterns.push(Self::Smooth { sense });
+                }
                 for &shaft in &shafts {
                     for order in 1..=4 {
                         patterns.push(Self::OneSense { shaft, order, sense });
@@ -170,6 +181,7 @@ impl Pattern {
                 }
             }
             Self::Level { .. } | Self::Step { .. } => 1,
+            Self::Smooth { .. } => 2 * SMOOTH_ORDERS,
             Self::RunLevels { runs } => runs - 1,
         }
     }
@@ -209,6 +221,13 @@ impl Pattern {
                     }
                 }
             }
+            Self::Smooth { sense } => {
+                if at.sense * sense > 0.0 {
+                    for (order, columns) in (1_u32..).zip(row.chunks_exact_mut(2)) {
+                        at.wave(Shaft::Input, f64::from(order), 1.0, columns);
+                    }
+                }
+            }
             Self::Level { odd, weight, mean } => row[0] = scale(*weight, *mean, *odd),
             Self::RunLevels { .. } => {
                 if at.run > 0 {
@@ -245,6 +264,10 @@ impl Pattern {
                 let sense = if *sense > 0.0 { "ccw" } else { "cw" };
                 format!("order {order} of the {} when driving {sense} only", shaft_name(shaft))
             }
+            Self::Smooth { sense } => {
+                let sense = if *sense > 0.0 { "ccw" } else { "cw" };
+                format!("a smooth pattern over the driver's turn when driving {sense} only")
+            }
             Self::Level { odd, weight, .. } => format!("an offset, {}", scaled(*odd, *weight)),
             Self::RunLevels { .. } => "an offset that differs from run to run".to_owned(),
             Self::Tone { frequency_hz } => format!("a tone of {frequency_hz:.4} Hz in time"),
@@ -268,6 +291,7 @@ impl Pattern {
         match self {
             Self::Order { shaft, odd, weight, .. } => scaled(shaft.carrier(), *odd, *weight),
             Self::OneSense { shaft, .. } => Signature::steady(shaft.carrier(), Parity::OneFlank),
+            Self::Smooth { .. } => Signature::steady(Carrier::Input, Parity::OneFlank),
             Self::Level { odd, weight, .. } => scaled(Carrier::None, *odd, *weight),
             Self::RunLevels { .. } | Self::Step { .. } => Signature::steady(Carrier::None, Parity::Mixed),
             Self::Tone { .. } => Signature::steady(Carrier::Time, Parity::Mixed),

@@ -1,0 +1,129 @@
+//! Knocks against the rig, lost readings, bursts: short stretches that stand far out of the other revolutions at the same angle and
+//! leave no step behind. No trace of angle, load or speed describes them, and as scatter they would drown everything else: they
+//! are cut out and reported.
+
+use super::grid::Grid;
+use super::reduce::ReducedRun;
+
+/// How far a place must stand out, in robust standard deviations, to begin a knock, and how little for it to be over.
+const OUTSTANDING: f64 = 8.0;
+const QUIET: f64 = 2.5;
+/// Quiet places that end a knock.
+const QUIET_PLACES: usize = 6;
+/// Places on either side whose levels tell a step from a knock, and the part of its peak that a step leaves.
+const BESIDE: usize = 30;
+const STEP: f64 = 0.25;
+/// What takes more than this part of the places is no knock.
+const MOST: f64 = 0.2;
+/// Median absolute deviation → standard deviation.
+const OF_MEDIAN: f64 = 1.4826;
+/// Least standard deviation, rad: finer than any encoder.
+const LEAST_RAD: f64 = 1e-9;
+
+/// Knocks that were cut out.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Knocks {
+    /// How many.
+    pub count: usize,
+    /// Time of the first since the campaign's start, s.
+    pub first_s: f64,
+    /// Largest deviation of a bin, rad.
+    pub peak_rad: f64,
+    /// Their mean square over the campaign's samples, rad².
+    pub mean_square_rad2: f64,
+}
+
+/// Finds knocks and cuts their points out of the runs; `None` where there are none.
+pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
+    let deviations = deviations(grid)?;
+    // As a bin of mean weight would scatter.
+    let mean_weight = grid.samples / grid.places.len() as f64;
+    let even: Vec<f64> =
+        deviations.iter().zip(&grid.weight).map(|(d, w)| d * (w / mean_weight).min(1.0).sqrt()).collect();
+    let mut sizes: Vec<f64> = even.iter().map(|d| d.abs()).collect();
+    let middle = sizes.len() / 2;
+    let sigma_rad = (OF_MEDIAN * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(LEAST_RAD);
+    let mut knocks = Knocks::default();
+    let mut cut = vec![false; deviations.len()];
+    for run in 0..grid.directions.len() {
+        let mut places = grid.revolutions.iter().filter(|r| r.run == run).map(|r| r.places.clone());
+        let Some(first) = places.next() else { continue };
+        let of_run = first.start..places.last().map_or(first.end, |last| last.end);
+        let mut at = of_run.start;
+        while let Some(begin) = (at..of_run.end).find(|p| even[*p].abs() > OUTSTANDING * sigma_rad) {
+            let window = window(&even, &of_run, begin, QUIET * sigma_rad);
+            at = window.end;
+            let peak_rad = window.clone().map(|p| deviations[p].abs()).fold(0.0, f64::max);
+            if leaves_a_step(&deviations, &of_run, &window, peak_rad) {
+                continue;
+            }
+            if knocks.count == 0 {
+                knocks.first_s = grid.places[begin].time_s;
+            }
+            knocks.count += 1;
+            knocks.peak_rad = knocks.peak_rad.max(peak_rad);
+            knocks.mean_square_rad2 +=
+                window.clone().map(|p| grid.weight[p] * deviations[p] * deviations[p]).sum::<f64>() / grid.samples;
+            cut[window].fill(true);
+        }
+    }
+    let lost = cut.iter().filter(|cut| **cut).count();
+    if knocks.count == 0 || lost as f64 > MOST * cut.len() as f64 {
+        return None;
+    }
+    for (run, places) in runs.iter_mut().zip(&grid.place_of_point) {
+        let mut place = places.iter();
+        run.points.retain(|_| place.next().is_none_or(|p| !cut[*p]));
+    }
+    Some(knocks)
+}
+
+/// Residual of every place less the median of its cell over the revolutions; `None` where cells do not come again often enough.
+fn deviations(grid: &Grid) -> Option<Vec<f64>> {
+    let mut cells: Vec<Vec<f64>> = vec![Vec::new(); grid.cells.len()];
+    for (place, cell) in grid.cell_of.iter().enumerate() {
+        cells[*cell].push(grid.rho_rad[place]);
+    }
+    if grid.places.len() < 3 * grid.cells.len() {
+        return None;
+    }
+    let medians: Vec<f64> = cells
+        .into_iter()
+        .map(|mut values| {
+            values.sort_by(f64::total_cmp);
+            0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2])
+        })
+        .collect();
+    Some(grid.cell_of.iter().zip(&grid.rho_rad).map(|(cell, rho)| rho - medians[*cell]).collect())
+}
+
+/// From where it begins to be loud to where it has been quiet for a while.
+fn window(deviations: &[f64], run: &std::ops::Range<usize>, begin: usize, quiet_rad: f64) -> std::ops::Range<usize> {
+    let loud = |p: &usize| deviations[*p].abs() > quiet_rad;
+    let mut start = begin;
+    while let Some(before) = (start.saturating_sub(QUIET_PLACES).max(run.start)..start).find(loud) {
+        start = before;
+    }
+    let mut end = begin + 1;
+    while let Some(after) = (end..(end + QUIET_PLACES).min(run.end)).rfind(loud) {
+        end = after + 1;
+    }
+    start..end
+}
+
+/// Whether the level before and after differs by a good part of the peak.
+fn leaves_a_step(
+    deviations: &[f64],
+    run: &std::ops::Range<usize>,
+    window: &std::ops::Range<usize>,
+    peak_rad: f64,
+) -> bool {
+    let median = |range: std::ops::Range<usize>| {
+        let mut values = deviations[range].to_vec();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(0.0)
+    };
+    let before = median(window.start.saturating_sub(BESIDE).max(run.start)..window.start);
+    let after = median(window.end..(window.end + BESIDE).min(run.end));
+    (after - before).abs() > STEP * peak_rad
+}
