@@ -32,6 +32,8 @@ const NEAR_NATS: f64 = 30.0;
 const LARGE: f64 = 0.12;
 /// Steps in which shapes are moved, in parts of their grid's.
 const SHARPENING_STEPS: [f64; 6] = [1.0, 0.6, 0.3, 0.15, 0.07, 0.03];
+/// First step of a wandering wave's order when it is sharpened, in parts of what the angle covered tells apart.
+const ORDER_STEP: f64 = 0.4;
 /// What a moved shape must gain, nats: a fifth of its standard deviation.
 const SHARPER_NATS: f64 = 0.02;
 /// Rounds of: search, look for events, sharpen shapes, estimate the noise anew.
@@ -442,13 +444,19 @@ impl<'a> Engine<'a> {
 
     /// Tries the shapes about that of block `n` of a set, and puts the best in its place.
     fn sharpen_block(&self, few: &mut Pool, set: &mut [usize], n: usize, step: f64) -> bool {
-        let Cause::Effect { effect, number, shape, cost_nats } = few.blocks[set[n]].cause.clone() else { return false };
         let whitened = self.noise.whiten(&self.grid, few);
         let Some(now) = evidence::fit(few, &whitened, set, &[]) else { return false };
-        let mut shapes = effect.neighbours(&shape, step);
-        shapes.extend(effect.refine(self.rig, &shape, &amplitudes_of(few, &now, n).beta));
-        let fresh: Vec<Cause> =
-            shapes.into_iter().map(|shape| Cause::Effect { effect, number, shape, cost_nats }).collect();
+        let fresh: Vec<Cause> = match few.blocks[set[n]].cause.clone() {
+            Cause::Effect { effect, number, shape, cost_nats } => {
+                let refined = effect.refine(self.rig, &shape, &amplitudes_of(few, &now, n).beta);
+                let shapes = effect.neighbours(&shape, step).into_iter().chain(refined);
+                shapes.map(|shape| Cause::Effect { effect, number, shape, cost_nats }).collect()
+            }
+            Cause::Unknown(pattern) => {
+                let nearer = pattern.nearer(step * ORDER_STEP / self.grid.span_rev().max(1.0));
+                nearer.into_iter().map(Cause::Unknown).collect()
+            }
+        };
         if fresh.is_empty() {
             return false;
         }
@@ -519,13 +527,8 @@ impl<'a> Engine<'a> {
     /// Looks for waves over the driver's angle that do not close with its turn, in a pool of its own, and takes the best into the
     /// pool where it is worth it.
     fn look_for_wandering_waves(&mut self) -> bool {
-        let (low, high) = self
-            .grid
-            .places
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), at| (l.min(at.theta1_rad), h.max(at.theta1_rad)));
         let mut step = 1.0;
-        let mut patterns = Pattern::wandering((high - low) / std::f64::consts::TAU);
+        let mut patterns = Pattern::wandering(self.grid.span_rev());
         if let [Pattern::Order { order: a, .. }, Pattern::Order { order: b, .. }, ..] = &patterns[..] {
             step = b - a;
         }

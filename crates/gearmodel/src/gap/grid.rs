@@ -159,6 +159,16 @@ impl Grid {
         grid
     }
 
+    /// Turns between the least and the largest angle of the driver.
+    #[must_use]
+    pub fn span_rev(&self) -> f64 {
+        let (low, high) = self
+            .places
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), at| (l.min(at.theta1_rad), h.max(at.theta1_rad)));
+        (high - low) / TAU
+    }
+
     fn add_run(&mut self, rig: &Rig, run: &ReducedRun, number: usize, frame: &RunFrame, ledger: &mut Ledger) {
         let index = self.directions.len();
         self.directions.push(run.direction);

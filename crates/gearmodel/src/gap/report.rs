@@ -273,10 +273,15 @@ impl Engine<'_> {
                     .collect()
             })
             .unwrap_or_default();
-        // A rate of events needs the campaign's length, which an effect does not know.
-        if let Some(steps) = parameters.get("steps").and_then(|entry| entry["value"].as_f64()) {
-            let per_rev = steps / self.grid.plan.revolutions.max(f64::MIN_POSITIVE);
-            parameters.insert("per_rev".to_owned(), json!({"value": per_rev, "std": null, "unit": "1/rev"}));
+        // Events and their rate: one follows from the other by the campaign's length, which an effect does not know.
+        let revolutions = self.grid.plan.revolutions.max(f64::MIN_POSITIVE);
+        let number = |name: &str| parameters.get(name).and_then(|entry| entry["value"].as_f64());
+        if let Some(steps) = number("steps") {
+            parameters
+                .insert("per_rev".to_owned(), json!({"value": steps / revolutions, "std": null, "unit": "1/rev"}));
+        } else if let Some(per_rev) = number("per_rev") {
+            parameters
+                .insert("steps".to_owned(), json!({"value": (per_rev * revolutions).round(), "std": null, "unit": ""}));
         }
         EffectFinding {
             name: effect.name().to_owned(),

@@ -163,11 +163,36 @@ impl<'a> Search<'a> {
                 }
             }
             if next.score <= best.score + 1e-6 {
+                // At the top of one hill: one effect may stand for two that together look like it.
+                next = self.one_for_two(&best, allowed).unwrap_or(next);
+            }
+            if next.score <= best.score + 1e-6 {
                 break;
             }
             best = next;
         }
         Some(best)
+    }
+
+    /// The best model with one block in place of two, where that is better.
+    fn one_for_two(&mut self, best: &Model, allowed: Allowed) -> Option<Model> {
+        let mut better: Option<Model> = None;
+        let set = &best.fit.set;
+        for m in 0..set.len() {
+            for n in 0..m {
+                let rest: Vec<usize> = set.iter().copied().filter(|b| *b != set[m] && *b != set[n]).collect();
+                let Some(fewer) = self.model(rest.clone(), Some(&best.fit)) else { continue };
+                for (block, score) in self.additions(&fewer, allowed, TRIED) {
+                    if score > best.score - 3.0
+                        && let Some(model) = self.model(with(&rest, block), Some(&best.fit))
+                        && model.score > better.as_ref().map_or(best.score + 1e-6, |b| b.score)
+                    {
+                        better = Some(model);
+                    }
+                }
+            }
+        }
+        better
     }
 
     /// The best model: the library first from several starts, then with patterns outside it.

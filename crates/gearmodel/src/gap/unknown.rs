@@ -11,7 +11,7 @@ const LEAST_TURN: f64 = 0.9;
 const HIGHEST_WANDERING: f64 = 3.5;
 
 /// Orders of a smooth pattern.
-const SMOOTH_ORDERS: usize = 10;
+const SMOOTH_ORDERS: usize = 18;
 
 /// How a pattern scales with the condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,11 +150,11 @@ impl Pattern {
             .collect()
     }
 
-    /// The same wave with orders closer about its own.
+    /// The same wave with orders closer about its own; none where it closes with the turn.
     #[must_use]
     pub fn nearer(&self, step: f64) -> Vec<Self> {
         match self {
-            Self::Order { shaft, order, odd, weight, mean } => [-0.5, -0.25, 0.25, 0.5]
+            Self::Order { shaft, order, odd, weight, mean } if order.fract() != 0.0 => [-0.5, -0.25, 0.25, 0.5]
                 .into_iter()
                 .map(|part| Self::Order {
                     shaft: *shaft,
