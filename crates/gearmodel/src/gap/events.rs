@@ -41,6 +41,8 @@ const SIZE_RATIO: f64 = 1.26;
 const TONE_STEPS: usize = 1 << 17;
 /// Log odds from which a tone is taken into the pool.
 const TONE_NATS: f64 = 6.0;
+/// The same below a few turns' frequency, where the scatter is not white.
+const LOW_TONE_NATS: f64 = 60.0;
 /// Most tones taken off.
 const MOST_TONES: usize = 3;
 /// Neighbours on either side that a tone must stand out of.
@@ -393,18 +395,45 @@ pub struct Tone {
 /// left.
 pub fn take_off_tones(rig: &Rig, runs: &mut [ReducedRun], mut grid: Grid) -> (Vec<Tone>, Grid) {
     let mut tones = Vec::new();
-    while tones.len() < MOST_TONES
-        && let Some(frequency_hz) = strongest_tone(&grid, runs)
-        && let Some(tone) = take_off_tone(runs, &grid, frequency_hz)
-    {
-        tones.push(tone);
-        grid = Grid::new(rig, runs);
+    for band in [Band::High, Band::Low] {
+        while tones.len() < MOST_TONES
+            && let Some(frequency_hz) = strongest_tone(&grid, runs, band)
+            && let Some(tone) = take_off_tone(runs, &grid, frequency_hz, band)
+        {
+            tones.push(tone);
+            grid = Grid::new(rig, runs);
+        }
     }
     (tones, grid)
 }
 
-/// Values at the points freed of what goes with the angle or is a slow wave of a revolution.
-fn freed(grid: &Grid, runs: &[ReducedRun], value: &dyn Fn(&Point) -> f64) -> Vec<f64> {
+/// Where tones are looked for. Below a few turns' frequency a tone looks like the waves that scatter from revolution to revolution:
+/// there they must not be taken off, and a line must stand the more out of them.
+#[derive(Clone, Copy, PartialEq)]
+enum Band {
+    High,
+    Low,
+}
+
+impl Band {
+    /// Its limits in turns' frequencies.
+    fn turns(self) -> [f64; 2] {
+        match self {
+            Self::High => [10.0, f64::INFINITY],
+            Self::Low => [2.0, 10.0],
+        }
+    }
+
+    fn least_nats(self) -> f64 {
+        match self {
+            Self::High => TONE_NATS,
+            Self::Low => LOW_TONE_NATS,
+        }
+    }
+}
+
+/// Values at the points freed of what goes with the angle and, in the high band, is a slow wave of a revolution.
+fn freed(grid: &Grid, runs: &[ReducedRun], band: Band, value: &dyn Fn(&Point) -> f64) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); grid.places.len()];
     let each = || runs.iter().zip(&grid.place_of_point).flat_map(|(run, places)| run.points.iter().zip(places));
     for (point, place) in each() {
@@ -412,16 +441,16 @@ fn freed(grid: &Grid, runs: &[ReducedRun], value: &dyn Fn(&Point) -> f64) -> Vec
         sums[*place].1 += point.samples;
     }
     let means: Vec<f64> = sums.iter().map(|(sum, weight)| sum / weight.max(f64::MIN_POSITIVE)).collect();
-    let residual = incoherent(grid, &means);
+    let residual = incoherent(grid, band, &means);
     each().map(|(point, place)| value(point) - means[*place] + residual[*place]).collect()
 }
 
-fn strongest_tone(grid: &Grid, runs: &[ReducedRun]) -> Option<f64> {
+fn strongest_tone(grid: &Grid, runs: &[ReducedRun], band: Band) -> Option<f64> {
     let duration_s = grid.plan.duration_s;
     if grid.revolutions.len() < 2 || duration_s <= 0.0 {
         return None;
     }
-    let values = freed(grid, runs, &|point| point.rho_rad);
+    let values = freed(grid, runs, band, &|point| point.rho_rad);
     let points: Vec<&Point> = runs.iter().flat_map(|run| &run.points).collect();
     let start_s = points.iter().map(|p| p.time_s).fold(f64::INFINITY, f64::min);
     let step_s = duration_s / (TONE_STEPS as f64 - 1.0);
@@ -432,26 +461,28 @@ fn strongest_tone(grid: &Grid, runs: &[ReducedRun]) -> Option<f64> {
         power += point.samples * point.samples * value * value;
     }
     FftPlanner::new().plan_fft_forward(series.len()).process(&mut series);
-    // Below a few turns' frequency the waves of the revolutions are not white; above half the points' rate all is mirrored.
+    // Above half the points' rate all is mirrored.
     let turn_hz = grid.plan.speeds_rad_per_s.last().copied().unwrap_or(0.0) / TAU;
     let bins_per_hz = 2.0 * duration_s;
-    let first = ((10.0 * turn_hz) * bins_per_hz).ceil().max(2.0 * NEIGHBOURS as f64) as usize;
+    let [low, high] = band.turns().map(|turns| turns * turn_hz * bins_per_hz);
+    let first = low.ceil().max(2.0 * NEIGHBOURS as f64) as usize;
     let mut gaps_s: Vec<f64> = points.windows(2).map(|w| w[1].time_s - w[0].time_s).collect();
     gaps_s.sort_by(f64::total_cmp);
     let gap_s = gaps_s.get(gaps_s.len() / 2).copied()?;
-    let last = ((0.45 / gap_s * bins_per_hz) as usize).min(TONE_STEPS - 2 * NEIGHBOURS);
+    let last = ((0.45 / gap_s * bins_per_hz).min(high) as usize).min(TONE_STEPS - 2 * NEIGHBOURS);
     let size: Vec<f64> = series[..TONE_STEPS].iter().map(|x| x.norm_sqr() / power).collect();
     let peak = (first..last).max_by(|a, b| size[*a].total_cmp(&size[*b]))?;
     // A tone is a line: it stands out of its neighbours too, which the broad spectrum of a step or a knock does not.
     let about = size[peak - NEIGHBOURS..peak - 4].iter().chain(&size[peak + 5..peak + NEIGHBOURS]);
     let level = about.sum::<f64>() / (2 * NEIGHBOURS - 9) as f64;
-    let nats = size[peak] / level.max(1.0) - (points.len() as f64).ln();
-    (nats > TONE_NATS).then_some(peak as f64 / bins_per_hz)
+    let level = if band == Band::High { level.max(1.0) } else { level };
+    let nats = size[peak] / level - (points.len() as f64).ln();
+    (nats > band.least_nats()).then_some(peak as f64 / bins_per_hz)
 }
 
 /// Refines the frequency, fits the tone and subtracts it; `None` where it is too small to matter.
-fn take_off_tone(runs: &mut [ReducedRun], grid: &Grid, frequency_hz: f64) -> Option<Tone> {
-    let values = freed(grid, runs, &|point| point.rho_rad);
+fn take_off_tone(runs: &mut [ReducedRun], grid: &Grid, frequency_hz: f64, band: Band) -> Option<Tone> {
+    let values = freed(grid, runs, band, &|point| point.rho_rad);
     let points: Vec<Point> = runs.iter().flat_map(|run| &run.points).copied().collect();
     let start_s = points.first()?.time_s;
     let explained = |frequency_hz: f64| {
@@ -475,8 +506,8 @@ fn take_off_tone(runs: &mut [ReducedRun], grid: &Grid, frequency_hz: f64) -> Opt
     }
     // The tone's own waves lose to the angle what the residual lost: both are freed alike before the fit.
     let phase = |point: &Point| TAU * centre_hz * (point.time_s - start_s);
-    let sines = freed(grid, runs, &|point| phase(point).sin());
-    let cosines = freed(grid, runs, &|point| phase(point).cos());
+    let sines = freed(grid, runs, band, &|point| phase(point).sin());
+    let cosines = freed(grid, runs, band, &|point| phase(point).cos());
     let mut normal = nalgebra::Matrix2::zeros();
     let mut right = nalgebra::Vector2::zeros();
     let mut square = 0.0;
@@ -497,8 +528,8 @@ fn take_off_tone(runs: &mut [ReducedRun], grid: &Grid, frequency_hz: f64) -> Opt
     Some(Tone { frequency_hz: centre_hz, amplitude_rad: beta.norm() })
 }
 
-/// Values of every place less their cell's mean over the revolutions and the revolution's own waves.
-fn incoherent(grid: &Grid, values: &[f64]) -> Vec<f64> {
+/// Values of every place less their cell's mean over the revolutions and, in the high band, the revolution's own waves.
+fn incoherent(grid: &Grid, band: Band, values: &[f64]) -> Vec<f64> {
     let mut means = vec![(0.0, 0.0); grid.cells.len()];
     for (place, cell) in grid.cell_of.iter().enumerate() {
         means[*cell].0 += grid.weight[place] * values[place];
@@ -511,6 +542,9 @@ fn incoherent(grid: &Grid, values: &[f64]) -> Vec<f64> {
             values[place] - if several { sum / weight } else { 0.0 }
         })
         .collect();
+    if band == Band::Low {
+        return rest;
+    }
     let freed: Vec<Vec<f64>> = grid
         .revolutions
         .par_iter()
