@@ -127,3 +127,72 @@ fn leaves_a_step(
     let after = median(window.end..(window.end + BESIDE).min(run.end));
     (after - before).abs() > STEP * peak_rad
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{Rig, Station};
+
+    /// One run of four turns with the residual as given at (turn, bin).
+    fn grid(rho: impl Fn(usize, usize) -> f64) -> Grid {
+        let bins = 100;
+        let mut grid = Grid::new(
+            &Rig::new(crate::NominalModel::new(pair(), crate::Errors::default()).unwrap(), [None, None], None),
+            &[],
+        );
+        grid.bins = bins;
+        grid.cells = vec![Station::default(); bins];
+        grid.directions = vec![crate::Direction::Ccw];
+        for turn in 0..4 {
+            for bin in 0..bins {
+                grid.places.push(Station { time_s: (turn * bins + bin) as f64, ..Station::default() });
+                grid.cell_of.push(bin);
+                // Scatter of 1 µrad that repeats nowhere.
+                let scatter = 1e-6 * (((turn * bins + bin) * 7919 % 101) as f64 / 50.0 - 1.0);
+                grid.rho_rad.push(rho(turn, bin) + scatter);
+                grid.weight.push(2.0);
+            }
+            let places = turn * bins..(turn + 1) * bins;
+            grid.revolutions.push(super::super::grid::Revolution { run: 0, places, coverage: 1.0 });
+        }
+        grid.samples = 800.0;
+        grid.place_of_point = vec![(0..400).collect()];
+        grid
+    }
+
+    fn pair() -> crate::GearPair {
+        crate::GearPair::constant(1.0).unwrap()
+    }
+
+    fn run() -> ReducedRun {
+        let points = vec![super::super::reduce::Point::default(); 400];
+        ReducedRun { direction: crate::Direction::Ccw, speed_rpm: 5.0, points, within_rad2: 0.0, samples: 800.0 }
+    }
+
+    #[test]
+    fn a_burst_is_cut_out_and_a_step_or_a_trace_of_the_angle_is_not() {
+        let ringing = |turn: usize, bin: usize| {
+            let after = bin as f64 - 40.0;
+            if turn == 2 && after >= 0.0 { 80e-6 * (-after / 5.0).exp() * after.cos() } else { 0.0 }
+        };
+        let mut runs = [run()];
+        let found = take_off(&grid(ringing), &mut runs).expect("a knock");
+        assert_eq!((found.count, found.first_s), (1, 240.0));
+        assert!((found.peak_rad - 80e-6).abs() < 3e-6, "{found:?}");
+        let lost = 400 - runs[0].points.len();
+        assert!((10..40).contains(&lost), "{lost} points lost");
+
+        let quiet: [&dyn Fn(usize, usize) -> f64; 3] = [
+            &|_, _| 0.0,
+            // The same in every turn, however large.
+            &|_, bin| if bin == 17 { 1e-3 } else { 0.0 },
+            // A count lost within the third turn.
+            &|turn, bin| if (turn, bin) >= (2, 60) { 40e-6 } else { 0.0 },
+        ];
+        for (n, rho) in quiet.into_iter().enumerate() {
+            let mut runs = [run()];
+            assert!(take_off(&grid(rho), &mut runs).is_none(), "case {n}");
+            assert_eq!(runs[0].points.len(), 400, "case {n}");
+        }
+    }
+}
