@@ -80,6 +80,20 @@ impl Station {
         self.wave(encoder, order, gain, row);
     }
 
+    /// Takes angles and all that follows from them from another station; condition and time stay.
+    pub fn take_angles_of(&mut self, other: &Self) {
+        *self = Self {
+            spread_rad: self.spread_rad,
+            load_nm: self.load_nm,
+            speed_rad_per_s: self.speed_rad_per_s,
+            time_s: self.time_s,
+            way_rev: self.way_rev,
+            run: self.run,
+            ledger: self.ledger,
+            ..*other
+        };
+    }
+
     /// Moves it to a little further along the driver's turn than `from`, as far as the teeth see it: angle and pitches.
     pub fn move_from(&mut self, from: &Self, step_rad: f64) {
         self.theta1_rad = from.theta1_rad + step_rad;

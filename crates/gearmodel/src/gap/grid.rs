@@ -265,8 +265,9 @@ impl Grid {
         // A cell stands for its places of all revolutions: where their samples lie in the mean, and as far about it as they do.
         for (cell, (first_rad, sum)) in self.cells[first_cell..].iter_mut().zip(cell_sums) {
             let (mean_rad, variance_rad2) = sum.spread();
-            let first = *cell;
-            cell.move_from(&first, run.direction.sign() * (mean_rad - first_rad));
+            let step_rad = run.direction.sign() * (mean_rad - first_rad);
+            let (theta1_rad, theta2_rad) = (cell.theta1_rad + step_rad, cell.theta2_rad + cell.ratio * step_rad);
+            cell.take_angles_of(&rig.station(theta1_rad, theta2_rad, run.direction));
             cell.spread_rad = variance_rad2.sqrt();
         }
         self.place_of_point[number] = keys.into_iter().map(|key| place_of_key[key]).collect();

@@ -35,14 +35,16 @@ pub struct Knocks {
 
 /// Finds knocks and cuts their points out of the runs; `None` where there are none.
 pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
-    let deviations = deviations(grid)?;
+    let Deviations { plain, beyond_climb: deviations } = deviations(grid)?;
     // As a bin of mean weight would scatter.
     let mean_weight = grid.samples / grid.places.len() as f64;
-    let even: Vec<f64> =
-        deviations.iter().zip(&grid.weight).map(|(d, w)| d * (w / mean_weight).min(1.0).sqrt()).collect();
-    let mut sizes: Vec<f64> = even.iter().map(|d| d.abs()).collect();
+    let even = |of: &[f64]| -> Vec<f64> {
+        of.iter().zip(&grid.weight).map(|(d, w)| d * (w / mean_weight).min(1.0).sqrt()).collect()
+    };
+    let mut sizes: Vec<f64> = even(&plain).into_iter().map(f64::abs).collect();
     let middle = sizes.len() / 2;
     let sigma_rad = (OF_MEDIAN * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(LEAST_RAD);
+    let even = even(&deviations);
     let mut knocks = Knocks::default();
     let mut cut = vec![false; deviations.len()];
     for run in 0..grid.directions.len() {
@@ -78,8 +80,16 @@ pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
     Some(knocks)
 }
 
-/// Residual of every place less the median of its cell over the revolutions; `None` where cells do not come again often enough.
-fn deviations(grid: &Grid) -> Option<Vec<f64>> {
+/// Residual of every place less the median of its cell over the revolutions.
+struct Deviations {
+    plain: Vec<f64>,
+    /// Less what the residual climbs from there to the next cells: where a tooth takes over, samples a little further on read that
+    /// much more.
+    beyond_climb: Vec<f64>,
+}
+
+/// `None` where cells do not come again often enough.
+fn deviations(grid: &Grid) -> Option<Deviations> {
     let mut cells: Vec<Vec<f64>> = vec![Vec::new(); grid.cells.len()];
     for (place, cell) in grid.cell_of.iter().enumerate() {
         cells[*cell].push(grid.rho_rad[place]);
@@ -94,7 +104,14 @@ fn deviations(grid: &Grid) -> Option<Vec<f64>> {
             0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2])
         })
         .collect();
-    Some(grid.cell_of.iter().zip(&grid.rho_rad).map(|(cell, rho)| rho - medians[*cell]).collect())
+    let climb = |cell: usize| {
+        let next = |other: usize| medians.get(other).map_or(0.0, |m| (m - medians[cell]).abs());
+        next(cell + 1).max(next(cell.wrapping_sub(1)))
+    };
+    let plain: Vec<f64> = grid.cell_of.iter().zip(&grid.rho_rad).map(|(cell, rho)| rho - medians[*cell]).collect();
+    let beyond_climb =
+        grid.cell_of.iter().zip(&plain).map(|(cell, d)| (d.abs() - climb(*cell)).max(0.0).copysign(*d)).collect();
+    Some(Deviations { plain, beyond_climb })
 }
 
 /// From where it begins to be loud to where it has been quiet for a while.
