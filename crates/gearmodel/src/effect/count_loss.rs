@@ -50,7 +50,7 @@ impl Effect for CountLoss {
         row[0] = if shape[..] == [RAMP] { at.way_rev } else { steps_so_far(shape, at.time_s) };
     }
 
-    fn evolves(&self) -> bool {
+    fn evolves(&self, _shape: &Shape) -> bool {
         true
     }
 

@@ -160,7 +160,7 @@ pub trait Effect: Sync {
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]);
 
     /// True where the trace differs between revolutions of one condition.
-    fn evolves(&self) -> bool {
+    fn evolves(&self, _shape: &Shape) -> bool {
         false
     }
 

@@ -186,7 +186,7 @@ impl Pool {
 
     fn unit_columns(&self, grid: &Grid, rig: &Rig, cause: &Cause) -> Option<(Vec<Values>, DMatrix<f64>)> {
         let (width, evolves) = match cause {
-            Cause::Effect { effect, shape, .. } => (effect.width(rig, shape), effect.evolves()),
+            Cause::Effect { effect, shape, .. } => (effect.width(rig, shape), effect.evolves(shape)),
             Cause::Unknown(pattern) => (pattern.width(), pattern.evolves()),
         };
         let (stations, weights) =

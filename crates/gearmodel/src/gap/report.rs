@@ -7,8 +7,11 @@ use crate::effect::{Carrier, Parameter, Parity, Signature, Value};
 use crate::gap::line_phase::LineError;
 use crate::gap::shrink::{HeldOut, Selection};
 
-/// Flattens what the noise model's own error makes too sure; calibrated on simulated campaigns.
-const SHARPNESS: f64 = 0.85;
+/// Under 1 it flattens what the noise model's own error makes too sure; calibrated on simulated campaigns.
+const SHARPNESS: f64 = 1.0;
+/// Standard deviations are this much larger than under the noise model alone, whose own error they do not know; calibrated on
+/// simulated campaigns.
+const WIDER: f64 = 1.25;
 /// How exact parameters are at best, in parts of their value, and phases in rad.
 const LINEARISED: f64 = 0.006;
 /// Members of a group nearer than this have one and the same trace, deg.
@@ -570,7 +573,7 @@ fn parameter(parameter: &Parameter) -> Json {
         (Value::Number(x), Some(std)) => {
             // A phase has no size of its own.
             let inexact = if parameter.name.starts_with("ph") { LINEARISED } else { LINEARISED * x.abs() };
-            Some(if std > 0.0 { std.hypot(inexact) } else { std })
+            Some(if std > 0.0 { (WIDER * std).hypot(inexact) } else { std })
         }
         (_, std) => std,
     };

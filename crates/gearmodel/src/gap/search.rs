@@ -67,7 +67,7 @@ impl<'a> Search<'a> {
                 // What is known to be there needs no evidence.
                 Cause::Effect { effect, .. } if known.iter().any(|name| name == effect.name()) => KNOWN_NATS,
                 Cause::Effect { cost_nats, .. } => EFFECT_ODDS.ln() - cost_nats,
-                Cause::Unknown(_) => UNKNOWN_ODDS.ln() - unknowns.ln(),
+                Cause::Unknown(pattern) => UNKNOWN_ODDS.ln() - unknowns.ln() - pattern.cost_nats(),
             })
             .collect();
         let offset = -0.5 * whitened.log_det - 0.5 * whitened.gram[(0, 0)];

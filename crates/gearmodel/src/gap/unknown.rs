@@ -13,6 +13,9 @@ const HIGHEST_WANDERING: f64 = 3.5;
 /// Orders of a smooth pattern.
 const SMOOTH_ORDERS: usize = 18;
 
+/// What the choice of a wave that does not close with the turn costs, nats.
+const WANDERING_COST_NATS: f64 = 5.0;
+
 /// How a pattern scales with the condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
@@ -183,6 +186,16 @@ impl Pattern {
             Self::Level { .. } | Self::Step { .. } => 1,
             Self::Smooth { .. } => 2 * SMOOTH_ORDERS,
             Self::RunLevels { runs } => runs - 1,
+        }
+    }
+
+    /// What it costs that it was chosen from many, nats.
+    #[must_use]
+    pub fn cost_nats(&self) -> f64 {
+        match self {
+            // The grid of orders and those between.
+            Self::Order { order, .. } if order.fract() != 0.0 => WANDERING_COST_NATS,
+            _ => 0.0,
         }
     }
 

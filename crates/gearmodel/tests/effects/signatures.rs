@@ -142,6 +142,6 @@ fn what_grows_says_so() {
     let closure = by_name("pitch_curve_error").unwrap().signature_of(&rig, &vec![1.0]);
     assert_eq!((closure.accumulates, closure.parity), (Accumulates::PerRevolution, Parity::Odd));
     for effect in LIBRARY.iter().filter(|e| e.signature().accumulates != Accumulates::No) {
-        assert!(effect.evolves(), "{}", effect.name());
+        assert!(effect.evolves(&Vec::new()), "{}", effect.name());
     }
 }
