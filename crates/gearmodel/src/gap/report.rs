@@ -25,11 +25,17 @@ const EVENT_PROBABILITY: f64 = 0.99;
 /// Prior odds of a sub-divisional error.
 const LINE_ODDS: f64 = 0.04;
 /// An effect or a remainder under this part of what was found may be the found effects' own inexactness; under this part of the
-/// floor, the nominal model's.
+/// floor, the nominal and the noise model's.
 const INEXACT: f64 = 0.05;
+const INEXACT_OF_FLOOR: f64 = 0.08;
 
 /// Largest probability of what may be no more than that.
 const INEXACT_PROBABILITY: f64 = 0.02;
+
+/// Smallest RMS worth naming beside what was found and what does not repeat.
+fn least_rad(found_rad2: f64, floor_rad: f64) -> f64 {
+    (INEXACT * found_rad2.sqrt()).max(INEXACT_OF_FLOOR * floor_rad)
+}
 
 /// What is named, and groups whose members have one and the same trace with the probability that one of them is there.
 struct Named {
@@ -94,7 +100,7 @@ impl Engine<'_> {
             .map(|f| f.rms_rad * f.rms_rad)
             .sum::<f64>();
         // What is too small to matter beside what was found, or beside what does not repeat.
-        let least_rad = INEXACT * (total_rad2 + explained_rad2).max(gap.floor_rad * gap.floor_rad).sqrt();
+        let least_rad = least_rad(total_rad2 + explained_rad2, gap.floor_rad);
         for finding in &mut findings {
             if finding.rms_rad < least_rad {
                 finding.probability = finding.probability.min(INEXACT_PROBABILITY);
@@ -372,7 +378,7 @@ impl Engine<'_> {
         }
         square += self.aside.mean_square_rad2();
         let rms_rad = square.sqrt();
-        let least_rad = INEXACT * known.max(floor_rad * floor_rad).max(lines_rad2).sqrt();
+        let least_rad = least_rad(known.max(lines_rad2), floor_rad);
         if let Some(knocks) = self.aside.knocks.filter(|knocks| knocks.mean_square_rad2.sqrt() > least_rad) {
             let description = format!(
                 "{} knocks or lost readings of up to {:.0} urad, the first at {:.2} s",
@@ -390,7 +396,7 @@ impl Engine<'_> {
             return Unknown { probability: EVENT_PROBABILITY, rms_rad, location };
         }
         // Effects are linearised and their shapes lie on grids: a small part of them may stay behind.
-        let inexact = square > 0.0 && rms_rad < INEXACT * known.max(floor_rad * floor_rad).sqrt();
+        let inexact = square > 0.0 && rms_rad < least_rad;
         let probability = if inexact { attribution.unknown.min(INEXACT_PROBABILITY) } else { attribution.unknown };
         let location = strongest
             .filter(|_| probability > 0.1)

@@ -13,8 +13,9 @@ const HIGHEST_WANDERING: f64 = 3.5;
 /// Orders of a smooth pattern.
 const SMOOTH_ORDERS: usize = 18;
 
-/// What the choice of a wave that does not close with the turn costs, nats.
-const WANDERING_COST_NATS: f64 = 5.0;
+/// What a wave that does not close with the turn costs, nats: it was chosen from many, and the scatter of the low orders runs on from
+/// turn to turn as such waves do.
+const WANDERING_COST_NATS: f64 = 12.0;
 
 /// How a pattern scales with the condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
