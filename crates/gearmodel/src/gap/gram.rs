@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DMatrixView};
 use rayon::prelude::*;
 
 /// Columns of the left factor taken together.
-const PANEL: usize = 64;
+const PANEL: usize = 128;
 /// Products of fewer columns than this are not worth being shared out.
 const SMALL: usize = 32;
 

@@ -14,7 +14,7 @@ use super::gram;
 use super::grid::Grid;
 use super::noise::WAVES;
 use super::unknown::Pattern;
-use crate::effect::{Effect, Grain, Rig, Shape};
+use crate::effect::{Effect, Grain, Rig, Shape, Station};
 
 /// What a block of columns stands for.
 #[derive(Clone)]
@@ -193,21 +193,27 @@ impl Pool {
             if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.base.cell_weight) };
         let mut raw = DMatrix::zeros(stations.len(), width);
         let (mut row, mut part) = (vec![0.0; width], vec![0.0; width]);
-        let places = match cause {
-            Cause::Effect { effect, .. } => effect.grain().places(),
-            Cause::Unknown(_) => Grain::Smooth.places(),
+        let grain = match cause {
+            Cause::Effect { effect, .. } => effect.grain(),
+            Cause::Unknown(_) => Grain::Smooth,
+        };
+        let places = grain.places();
+        let take = |station: &Station, row: &mut [f64]| match cause {
+            Cause::Effect { effect, shape, .. } => effect.row(rig, shape, station, row),
+            Cause::Unknown(pattern) => pattern.row(station, row),
         };
         for (number, station) in stations.iter().enumerate() {
             row.fill(0.0);
-            let mut near = *station;
-            for place in places {
-                near.move_from(station, place * station.spread_rad);
-                part.fill(0.0);
-                match cause {
-                    Cause::Effect { effect, shape, .. } => effect.row(rig, shape, &near, &mut part),
-                    Cause::Unknown(pattern) => pattern.row(&near, &mut part),
+            if grain == Grain::Smooth {
+                take(station, &mut row);
+            } else {
+                let mut near = *station;
+                for place in places {
+                    near.move_from(station, place * station.spread_rad);
+                    part.fill(0.0);
+                    take(&near, &mut part);
+                    row.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x / places.len() as f64);
                 }
-                row.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x / places.len() as f64);
             }
             for (column, value) in row.iter().enumerate() {
                 raw[(number, column)] = *value;
