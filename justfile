@@ -29,3 +29,14 @@ pictures:
 bench-cpu:
     cargo build --release -p rigd
     python3 scripts/bench_cpu.py
+
+# A million Modbus transactions a device with faults in simulated time; no value may be silently wrong.
+modbus-faults TRANSACTIONS="1000000":
+    cargo build --release -p rigd --example modbus_faults
+    for device in servo brake table; do target/release/examples/modbus_faults --device $device --transactions {{TRANSACTIONS}} || exit 1; done
+
+# The same over pseudo-terminals in real time, and against pymodbus's server (a quarter of an hour).
+modbus-faults-pty TRANSACTIONS="10000":
+    cargo build --release -p rigd --example modbus_faults
+    for device in servo brake; do target/release/examples/modbus_faults --device $device --over pty --transactions {{TRANSACTIONS}} || exit 1; done
+    target/release/examples/modbus_faults --device pymodbus --transactions {{TRANSACTIONS}}

@@ -6,9 +6,11 @@
 
 pub mod emulator;
 pub mod plant;
+pub mod proxy;
 pub mod pty;
 pub mod serve;
 pub mod starter;
+pub mod trial;
 pub mod world;
 
 use std::cell::RefCell;
