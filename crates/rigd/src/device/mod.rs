@@ -1,9 +1,10 @@
 //! Devices by what they do. One device is one file and one line in its list.
 
-pub mod asda_b2;
 pub mod bus;
 pub mod counter_box;
-pub mod rd60xx;
+pub mod map;
+pub mod mapped_brake;
+pub mod mapped_servo;
 
 use std::time::Duration;
 
@@ -109,6 +110,14 @@ pub enum DeviceError {
         /// What it said last.
         status: String,
     },
+    /// Its register map cannot be used.
+    #[error("{device}: {reason}; `rigd profile check` shows every fault")]
+    Map {
+        /// Which device.
+        device: &'static str,
+        /// What is wrong with the map.
+        reason: String,
+    },
     /// The encoders' stream stopped.
     #[error("counter on {port}: {what}; check power, cable and plug")]
     Counter {
@@ -133,7 +142,7 @@ pub enum DeviceError {
         /// Its port.
         port: String,
         /// The parameter.
-        register: &'static str,
+        register: String,
         /// What it reads.
         read: String,
         /// What was written.
@@ -195,11 +204,15 @@ pub trait Counter {
 /// Drivers by their name in the profile: each is opened on its link.
 type Drivers<P, D> = &'static [(&'static str, fn(Link, Address, &P) -> Box<D>)];
 
+/// Driver's name of a device whose register map is a file of its own, named by `map`.
+pub const MAP: &str = "map";
+
 /// Servo drives by their name in the profile.
-pub const SERVOS: Drivers<ServoProfile, dyn Servo> = &[("asda-b2", asda_b2::open)];
+pub const SERVOS: Drivers<ServoProfile, dyn Servo> =
+    &[("asda-b2", mapped_servo::open), ("dsy-rs", mapped_servo::open), (MAP, mapped_servo::open)];
 
 /// Brake drivers by their name in the profile.
-pub const BRAKES: Drivers<BrakeProfile, dyn Brake> = &[("rd60xx", rd60xx::open)];
+pub const BRAKES: Drivers<BrakeProfile, dyn Brake> = &[("rd60xx", mapped_brake::open), (MAP, mapped_brake::open)];
 
 /// Encoder readers by their name in the profile.
 pub const COUNTERS: Drivers<CounterProfile, dyn Counter> = &[("counter-box", counter_box::open)];

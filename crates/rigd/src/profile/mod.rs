@@ -1,5 +1,7 @@
 //! The rig's profile: which devices, on which ports, within which limits. TOML, checked before anything moves.
 
+pub mod lines;
+
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -41,6 +43,9 @@ pub struct Profile {
 pub struct ServoProfile {
     /// Driver's name, see `device::SERVOS`.
     pub driver: String,
+    /// Register map, with driver `map`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<PathBuf>,
     /// Path, `tcp://host:port`, or `sim`.
     pub port: String,
     /// Line speed, bit/s.
@@ -65,6 +70,9 @@ pub struct ServoProfile {
 pub struct BrakeProfile {
     /// Driver's name, see `device::BRAKES`.
     pub driver: String,
+    /// Register map, with driver `map`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<PathBuf>,
     /// Path, `tcp://host:port`, or `sim`.
     pub port: String,
     /// Line speed, bit/s.
