@@ -11,6 +11,7 @@ pub mod chart;
 pub mod cli;
 pub mod clock;
 pub mod device;
+pub mod doctor;
 pub mod gap;
 pub mod link;
 pub mod pair;

@@ -96,6 +96,14 @@ impl Address {
         Ok(Box::new(port))
     }
 
+    /// Whether the character format is one of ours.
+    ///
+    /// # Errors
+    /// [`LinkError::Format`].
+    pub fn check_format(&self) -> Result<(), LinkError> {
+        self.line_format().map(drop)
+    }
+
     fn line_format(&self) -> Result<(DataBits, Parity, StopBits), LinkError> {
         let refuse = || LinkError::Format { device: self.device, format: self.format.clone() };
         let mut parts = self.format.chars();

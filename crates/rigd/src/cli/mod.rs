@@ -4,9 +4,11 @@ mod analyse;
 mod blindtest;
 mod diagnose;
 mod directions;
+mod doctor;
 mod import;
 mod info;
 mod model;
+mod profile;
 mod replay;
 mod run;
 mod sim;
@@ -74,6 +76,10 @@ enum Command {
     Sim(sim::Args),
     /// Make withheld cases on the simulated rig, diagnose them, and score the answers
     Blindtest(blindtest::Args),
+    /// Check a rig's profile or a register map, or write a new profile
+    Profile(profile::Args),
+    /// Look at a rig before it runs and say what to do; nothing moves without --turn
+    Doctor(doctor::Args),
     /// End a run from another terminal, as Ctrl-C does
     Stop(stop::Args),
 }
@@ -101,6 +107,8 @@ pub fn main() -> ExitCode {
         Command::Model(args) => model::main(&args),
         Command::Sim(args) => sim::main(&args),
         Command::Blindtest(args) => blindtest::main(&args),
+        Command::Profile(args) => profile::main(&args),
+        Command::Doctor(args) => doctor::main(&args),
         Command::Stop(args) => stop::main(&args),
     };
     ExitCode::from(exit as u8)

@@ -5,6 +5,7 @@ pub mod counter_box;
 pub mod map;
 pub mod mapped_brake;
 pub mod mapped_servo;
+pub mod refused;
 
 use std::time::Duration;
 

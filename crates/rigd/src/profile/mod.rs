@@ -1,5 +1,6 @@
 //! The rig's profile: which devices, on which ports, within which limits. TOML, checked before anything moves.
 
+pub mod check;
 pub mod lines;
 
 use std::path::{Path, PathBuf};
@@ -291,6 +292,11 @@ impl Profile {
             }
         }
         Ok(())
+    }
+
+    /// From a table that was read already.
+    fn deserialize_table(table: &toml::Table) -> Result<Self, toml::de::Error> {
+        Self::deserialize(toml::Value::Table(table.clone()))
     }
 
     /// Period of the drives' polling.

@@ -144,10 +144,18 @@ impl Owner {
                     let (window, words) = self.read(whole).await?;
                     return Ok(ranges.iter().map(|range| part(*range, window, &words)).collect());
                 }
+                let mut read: Vec<(Range, Vec<u16>)> = Vec::new();
                 let mut parts = Vec::with_capacity(ranges.len());
                 for range in ranges {
-                    let (window, words) = self.read(*range).await?;
-                    parts.push(part(*range, window, &words));
+                    // What an earlier window happens to hold is not asked for again.
+                    let held =
+                        read.iter().find(|(window, _)| window.first <= range.first && window.end() >= range.end());
+                    if held.is_none() {
+                        read.push(self.read(*range).await?);
+                    }
+                    let held =
+                        read.iter().find(|(window, _)| window.first <= range.first && window.end() >= range.end());
+                    parts.push(held.map(|(window, words)| part(*range, *window, words)).unwrap_or_default());
                 }
                 Ok(parts)
             }
