@@ -147,3 +147,46 @@ fn a_master_without_drain_is_caught() {
         assert!(tally.silently_wrong > 100, "{}: {tally:?}", kind.name());
     }
 }
+
+/// A process that ends with its test.
+struct Server(std::process::Child);
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A server of another hand, over pseudo-terminals in real time; `./test` names the Python that has it.
+#[test]
+fn no_value_of_pymodbus_is_silently_wrong() {
+    use std::io::BufRead as _;
+    let Some(python) = std::env::var_os("RIG_PYTHON") else {
+        println!("RIG_PYTHON is not set: not tried");
+        return;
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let directory = tempfile::TempDir::new().unwrap();
+    let tally = LocalSet::new().block_on(&runtime, async {
+        let path = directory.path().join("server");
+        let (device, _terminal) = rigd::sim::pty::Terminal::at(&path).unwrap();
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/modbus_server.py");
+        let mut command = std::process::Command::new(python);
+        let mut server =
+            Server(command.arg(script).arg(&path).stdout(std::process::Stdio::piped()).spawn().expect("Python starts"));
+        let output = std::io::BufReader::new(server.0.stdout.take().unwrap());
+        assert!(output.lines().map_while(Result::ok).any(|line| line == "ready"), "pymodbus did not start");
+        let (timing, work) = (Timing::brisk(), Counting::WORKLOAD);
+        let mut cable: Link = Box::new(device);
+        let pty = || {
+            let (near, far) = tokio_serial::SerialStream::pair()?;
+            Ok((Box::new(near) as Link, Box::new(far) as Link))
+        };
+        let plan = timing.faults(1, 0.15);
+        trial::run(300, &work, plan, 1, &mut cable, pty, |link| timing.master(link, &work)).await.unwrap()
+    });
+    println!("{tally:?}");
+    assert_eq!(tally.silently_wrong, 0, "{:#?}", tally.examples);
+    assert!(tally.fault_count() > 30 && tally.right as f64 > 0.7 * tally.calls as f64, "{tally:?}");
+}

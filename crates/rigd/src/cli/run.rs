@@ -360,6 +360,7 @@ fn conclude(args: &Args, path: &Path, backend: String, warnings: Vec<String>, ou
         warnings: warnings.into_iter().chain(outcome.troubles.iter().cloned()).collect(),
     };
     let mut summary = Summary::of(&outcome.analysis, origin);
+    summary.lines.clone_from(&outcome.lines);
     let picture = path.with_extension("svg");
     match plot::draw(&outcome.analysis, &picture) {
         Ok(true) => summary.plot = Some(picture.display().to_string()),

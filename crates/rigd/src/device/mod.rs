@@ -2,10 +2,12 @@
 
 pub mod bus;
 pub mod counter_box;
+pub mod dsp7000;
 pub mod map;
 pub mod mapped_brake;
 pub mod mapped_servo;
 pub mod refused;
+pub mod two_clocks;
 
 use std::time::Duration;
 
@@ -119,6 +121,16 @@ pub enum DeviceError {
         /// What is wrong with the map.
         reason: String,
     },
+    /// Its line failed, or said what it must not.
+    #[error("{device} on {port}: {what}")]
+    Line {
+        /// Which device.
+        device: &'static str,
+        /// Its port.
+        port: String,
+        /// What happened, and what to check.
+        what: String,
+    },
     /// The encoders' stream stopped.
     #[error("counter on {port}: {what}; check power, cable and plug")]
     Counter {
@@ -213,7 +225,8 @@ pub const SERVOS: Drivers<ServoProfile, dyn Servo> =
     &[("asda-b2", mapped_servo::open), ("dsy-rs", mapped_servo::open), (MAP, mapped_servo::open)];
 
 /// Brake drivers by their name in the profile.
-pub const BRAKES: Drivers<BrakeProfile, dyn Brake> = &[("rd60xx", mapped_brake::open), (MAP, mapped_brake::open)];
+pub const BRAKES: Drivers<BrakeProfile, dyn Brake> =
+    &[("rd60xx", mapped_brake::open), ("dsp7000", dsp7000::open), (MAP, mapped_brake::open)];
 
 /// Encoder readers by their name in the profile.
 pub const COUNTERS: Drivers<CounterProfile, dyn Counter> = &[("counter-box", counter_box::open)];

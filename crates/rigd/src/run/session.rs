@@ -1,6 +1,7 @@
 //! A session: open the log, connect, run the plan, switch off, finalise, and say what came of it.
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -22,6 +23,7 @@ use super::sequence;
 use super::stop::StopRequests;
 use crate::analysis::Analysis;
 use crate::clock::Clock;
+use crate::device::bus::BusStatistics;
 use crate::device::{self, Brake, Counter, Servo, UnknownDriver};
 use crate::link::{Address, Link, LinkError};
 use crate::profile::Profile;
@@ -61,6 +63,8 @@ pub struct Outcome {
     pub lost: u64,
     /// Entries that could not be written.
     pub unwritten: u64,
+    /// What happened on each device's line.
+    pub lines: BTreeMap<&'static str, BusStatistics>,
 }
 
 /// The links to the three devices; `None` where the profile's port is to be opened.
@@ -101,6 +105,7 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
     let total = setup.plan.revolutions * (setup.plan.loads_nm.len() * setup.plan.directions.len()) as f64;
     let progress = Progress::new(total, setup.quiet);
 
+    let mut lines = BTreeMap::new();
     let (halt, mut troubles) = match connect(&setup.profile, links).await {
         Ok(devices) => {
             let mut rig = Rig::new(
@@ -119,6 +124,7 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
             let troubles = rig.switch_off(rig.stop.hurried()).await;
             for (device, line) in [("servo", rig.servo.statistics()), ("brake", rig.brake.statistics())] {
                 acquisition.borrow().event(Level::Info, "line", format!("{device}: {line}"));
+                lines.insert(device, line);
             }
             rig.progress.finish();
             // A stop that came while the rig was stopping by itself was a stop all the same.
@@ -148,7 +154,7 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
             troubles.push(format!("the log could not be finalised: {error}"));
         }
     }
-    Ok(Outcome { analysis, halt, troubles, lost, unwritten })
+    Ok(Outcome { analysis, halt, troubles, lost, unwritten, lines })
 }
 
 /// Makes a panic of the sequence a reason to switch off in order, as any other.

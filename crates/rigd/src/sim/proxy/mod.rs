@@ -81,7 +81,7 @@ pub struct Proxy {
     requests: ServerDecoder,
     frames: Vec<ServerFrame>,
     /// Asked and not yet answered by the device.
-    open: std::collections::VecDeque<(u8, Request)>,
+    open: std::collections::VecDeque<(Instant, u8, Request)>,
     /// What the device has sent of its next answer.
     answer: Vec<u8>,
     /// What is on its way to the master, by due time and order.
@@ -197,7 +197,7 @@ impl Proxy {
         let arrives = !matches!(fault, Some(Fault::LostRequest | Fault::CorruptRequest));
         for frame in frames.drain(..).filter(|_| arrives) {
             if let Incoming::Request(request) = frame.incoming {
-                self.open.push_back((frame.unit, request));
+                self.open.push_back((now, frame.unit, request));
             }
         }
         self.frames = frames;
@@ -209,8 +209,11 @@ impl Proxy {
         self.answer.extend_from_slice(bytes);
         while let Some(length) = answer_length(&self.answer).filter(|length| self.answer.len() >= *length) {
             let frame: Vec<u8> = self.answer.drain(..length).collect();
-            // A device that did not answer an earlier request has been asked again since.
-            while let Some((unit, request)) = self.open.pop_front() {
+            // A request that the device never answered must not be taken for the one that it answers now: requests of one shape
+            // are further apart than the latest answer.
+            let now = Instant::now();
+            self.open.retain(|(asked, ..)| now - *asked <= self.plan.latest);
+            while let Some((_, unit, request)) = self.open.pop_front() {
                 if let Some(response) = parse(unit, &request, &frame) {
                     self.record.borrow_mut().add(Exchange { request, response });
                     break;

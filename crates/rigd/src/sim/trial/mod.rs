@@ -282,8 +282,16 @@ impl Caller<'_> {
             Request::WriteMultiple { values: written, .. } => written == values,
             Request::ReadHolding { .. } => false,
         });
+        // Or the device itself showed it afterwards: confirmations of one register's writes look all alike.
+        let covers = |request: &Request| {
+            matches!(request, Request::ReadHolding { .. })
+                && request.address() <= first
+                && u32::from(request.address()) + u32::from(request.count()) >= u32::from(first) + values.len() as u32
+        };
+        let read = record.since(mark).filter(|exchange| covers(&exchange.request)).last();
+        let shown = read.is_some_and(|exchange| holds(&exchange.request, &exchange.response, first, values));
         drop(record);
-        if done {
+        if done || shown {
             self.tally.right += 1;
         } else {
             self.tally.wrong(format!("write {values:?} to {first:#06x}: called done, the device did not do it"));
