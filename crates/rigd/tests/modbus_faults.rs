@@ -22,12 +22,15 @@ fn in_simulated_time<M: Master>(
     plan: FaultPlan,
     master: impl Fn(Link, &Workload) -> M,
 ) -> Tally {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build().unwrap();
+    let runtime =
+        tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build().expect("a runtime");
     LocalSet::new().block_on(&runtime, async {
         let work = device.workload();
         let (mut cable, end) = pipe();
         tokio::task::spawn_local(trial::serve(end, device));
-        trial::run(transactions, &work, plan, 1, &mut cable, || Ok(pipe()), |link| master(link, &work)).await.unwrap()
+        trial::run(transactions, &work, plan, 1, &mut cable, || Ok(pipe()), |link| master(link, &work))
+            .await
+            .expect("a cable")
     })
 }
 
@@ -75,7 +78,7 @@ impl<L: Duplex> Naive<L> {
     async fn ask(&mut self, request: &Request) -> Result<Response, Told> {
         // The inter-frame silence it does keep.
         tokio::time::sleep(Duration::from_millis(10)).await;
-        let frame = encode_request(self.unit, request).unwrap();
+        let frame = encode_request(self.unit, request).expect("a request");
         self.line.write_all(&frame).await.map_err(|_| Told::HungUp)?;
         let mut buffer = [0; 256];
         // As an operating system's buffer takes what comes.

@@ -108,7 +108,7 @@ impl FaultPlan {
     /// All faults, reproducible by `seed`.
     #[must_use]
     pub fn new(seed: u64, share: f64, latest: Duration, latest_repetition: Duration) -> Self {
-        let random = Pcg64::new(u128::from(seed), 0xa02b_dbf7_bb3c_0a7a_c28f_a16a_64ab_f96);
+        let random = Pcg64::new(u128::from(seed), 0x0a02_bdbf_7bb3_c0a7_ac28_fa16_a64a_bf96);
         Self { share, kinds: Fault::ALL.to_vec(), latest, latest_repetition, random }
     }
 

@@ -126,7 +126,7 @@ impl Proxy {
                 biased;
                 read = device.read(&mut answered) => {
                     let Ok(count @ 1..) = read else { return End::DeviceGone };
-                    self.from_device(&answered[..count]);
+                    self.take_answer(&answered[..count]);
                 }
                 () = sleep_until(next.unwrap_or_else(far_future)), if next.is_some() => {
                     for bytes in self.take_due() {
@@ -137,7 +137,7 @@ impl Proxy {
                 }
                 read = master.read(&mut asked) => {
                     let Ok(count @ 1..) = read else { return End::MasterGone };
-                    match self.from_master(&asked[..count]) {
+                    match self.take_request(&asked[..count]) {
                         None => return End::HungUp,
                         Some(bytes) => if device.write_all(&bytes).await.is_err() {
                             return End::DeviceGone;
@@ -171,7 +171,7 @@ impl Proxy {
     }
 
     /// Bytes for the device; `None` hangs up.
-    fn from_master(&mut self, bytes: &[u8]) -> Option<Vec<u8>> {
+    fn take_request(&mut self, bytes: &[u8]) -> Option<Vec<u8>> {
         // Masters here send whole requests.
         let mut frames = std::mem::take(&mut self.frames);
         let _ = self.requests.idle();
@@ -205,7 +205,7 @@ impl Proxy {
     }
 
     /// Collects the device's bytes; its frames are whole and in order.
-    fn from_device(&mut self, bytes: &[u8]) {
+    fn take_answer(&mut self, bytes: &[u8]) {
         self.answer.extend_from_slice(bytes);
         while let Some(length) = answer_length(&self.answer).filter(|length| self.answer.len() >= *length) {
             let frame: Vec<u8> = self.answer.drain(..length).collect();
