@@ -7,6 +7,7 @@ use gearmodel::measure::RunConditions;
 use rigd::analysis::Analysis;
 use rigd::clock::Clock;
 use rigd::device::CounterIdentity;
+use rigd::profile::Profile;
 use rigd::run::acquire::Acquisition;
 use rigd::run::recorder::{Entry, Recorder};
 use rigd::{pair, replay};
@@ -67,7 +68,8 @@ fn record(
 ) -> (PathBuf, Analysis, u64, f64) {
     let (pair_toml, model) = pair::load(None).expect("the built-in pair");
     let path = directory.join("run.mcap");
-    let recorder = Recorder::create(&path, WriterOptions::new("test")).expect("a log");
+    let recorder =
+        Recorder::create(&path, WriterOptions::new("test"), &Profile::simulated().log, "test").expect("a log");
     recorder.write(0, 0, Entry::Attachment("pair.toml", "application/toml", pair_toml.into_bytes()));
     let mut acquisition = Acquisition::new(recorder, Clock::simulated(), Analysis::new(model.clone()));
     let identity =

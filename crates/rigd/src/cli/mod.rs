@@ -1,12 +1,16 @@
 //! The command line. One command is one file; here they are only routed.
 
 mod analyse;
+mod audit;
 mod blindtest;
 mod diagnose;
 mod directions;
+mod export;
 mod import;
 mod info;
 mod model;
+mod prune;
+mod recover;
 mod replay;
 mod run;
 mod sim;
@@ -66,6 +70,14 @@ enum Command {
     Verify(verify::Args),
     /// Say what is in a log
     Info(info::Args),
+    /// Check logs: every checksum, every sample's and message's number, both clocks
+    Audit(audit::Args),
+    /// Give logs that a killed run left behind their end
+    Recover(recover::Args),
+    /// List old logs, and delete them when told so
+    Prune(prune::Args),
+    /// Write the samples of a log as a table (CSV, Parquet, NumPy)
+    Export(export::Args),
     /// Make a log from a table of angles (CSV, Parquet)
     Import(import::Args),
     /// Ask the model of a gear pair: TE, backlash, drawings, checks
@@ -97,6 +109,10 @@ pub fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::main(&args),
         Command::Verify(args) => verify::main(&args),
         Command::Info(args) => info::main(&args),
+        Command::Audit(args) => audit::main(&args),
+        Command::Recover(args) => recover::main(&args),
+        Command::Prune(args) => prune::main(&args),
+        Command::Export(args) => export::main(&args),
         Command::Import(args) => import::main(&args),
         Command::Model(args) => model::main(&args),
         Command::Sim(args) => sim::main(&args),

@@ -150,6 +150,40 @@ pub struct LogPolicy {
     pub chunk_ms: u32,
     /// The file is synced to disk after this time, ms.
     pub sync_ms: u32,
+    /// The log goes on in a new file at this size, MB; 0 is never.
+    #[serde(default)]
+    pub rotate_mb: f64,
+    /// The log goes on in a new file after this time, minutes; 0 is never.
+    #[serde(default)]
+    pub rotate_minutes: f64,
+    /// Under this much free space the run warns, MB.
+    #[serde(default = "warn_free_mb")]
+    pub warn_free_mb: f64,
+    /// Under this much free space no run begins, and one under way stops in order, MB.
+    #[serde(default = "stop_free_mb")]
+    pub stop_free_mb: f64,
+}
+
+/// Ten hours at 18 kHz, and some.
+fn warn_free_mb() -> f64 {
+    2000.0
+}
+
+/// Far more than what is queued and the end of a log need.
+fn stop_free_mb() -> f64 {
+    100.0
+}
+
+impl LogPolicy {
+    /// When the log goes on in a new file.
+    #[must_use]
+    pub fn rotation(&self) -> riglog::Rotation {
+        const BYTES_PER_MB: f64 = 1e6;
+        riglog::Rotation {
+            bytes: (self.rotate_mb > 0.0).then_some((self.rotate_mb * BYTES_PER_MB) as u64),
+            period: (self.rotate_minutes > 0.0).then(|| Duration::from_secs_f64(self.rotate_minutes * 60.0)),
+        }
+    }
 }
 
 /// Why a profile is refused.
@@ -261,6 +295,17 @@ impl Profile {
         }
         if !(10..=1000).contains(&self.log.sync_ms) {
             return refuse("log.sync_ms", self.log.sync_ms.to_string(), "from 10 to 1000 ms".into());
+        }
+        // A million minutes are two years; a part under 10 kB would be mostly head.
+        for (key, value, least, most) in [
+            ("log.rotate_mb", self.log.rotate_mb, 0.01, 1e6),
+            ("log.rotate_minutes", self.log.rotate_minutes, 0.01, 1e6),
+            ("log.warn_free_mb", self.log.warn_free_mb, 0.0, 1e9),
+            ("log.stop_free_mb", self.log.stop_free_mb, 0.0, 1e9),
+        ] {
+            if value != 0.0 && !(least..=most).contains(&value) {
+                return refuse(key, value.to_string(), format!("0, or from {least} to {most}"));
+            }
         }
         for (key, sign) in [
             ("servo.sense", self.servo.sense),

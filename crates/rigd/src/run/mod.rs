@@ -7,6 +7,7 @@ pub mod recorder;
 pub mod rig;
 pub mod sequence;
 pub mod session;
+pub mod space;
 pub mod stop;
 
 use gearmodel::Direction;

@@ -86,6 +86,7 @@ struct Devices {
 /// # Errors
 /// [`LogError`] when the log cannot be made.
 pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -> Result<Outcome, LogError> {
+    let run_id = uuid::Uuid::new_v4().to_string();
     let recorder = Recorder::create(
         &setup.path,
         WriterOptions {
@@ -93,9 +94,11 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
             sync_period_ms: setup.profile.log.sync_ms,
             ..WriterOptions::new(SOFTWARE)
         },
+        &setup.profile.log,
+        &run_id,
     )?;
     let _size_limit = outlive_size_limit();
-    describe(&recorder, &setup, clock);
+    describe(&recorder, &setup, run_id, clock);
     let analysis = Analysis::new(setup.model.clone());
     let acquisition = Rc::new(RefCell::new(Acquisition::new(recorder, clock, analysis)));
     let total = setup.plan.revolutions * (setup.plan.loads_nm.len() * setup.plan.directions.len()) as f64;
@@ -172,7 +175,7 @@ fn outlive_size_limit() -> Option<Signal> {
 }
 
 /// Metadata and attachments that say what this log is.
-fn describe(recorder: &Recorder, setup: &Setup, clock: Clock) {
+fn describe(recorder: &Recorder, setup: &Setup, run_id: String, clock: Clock) {
     let plan = &setup.plan;
     let now = clock.now_ns();
     let directions: Vec<_> = plan.directions.iter().map(ToString::to_string).collect();
@@ -180,7 +183,7 @@ fn describe(recorder: &Recorder, setup: &Setup, clock: Clock) {
         now,
         now,
         Entry::Run(Box::new(RunMetadata {
-            run_id: uuid::Uuid::new_v4().to_string(),
+            run_id,
             started: jiff::Timestamp::now().to_string(),
             software: SOFTWARE.into(),
             host: nix::unistd::gethostname().ok().and_then(|name| name.into_string().ok()).unwrap_or_default(),
