@@ -3,6 +3,7 @@
 mod analyse;
 mod audit;
 mod blindtest;
+mod calibrate;
 mod diagnose;
 mod directions;
 mod export;
@@ -13,9 +14,10 @@ mod prune;
 mod recover;
 mod replay;
 mod run;
+mod serve;
 mod sim;
 mod simulator;
-mod stop;
+pub mod stop;
 mod verify;
 mod withhold;
 
@@ -70,6 +72,8 @@ enum Command {
     Verify(verify::Args),
     /// Say what is in a log
     Info(info::Args),
+    /// Find what a rig's brake, encoders and zeros are, with uncertainties
+    Calibrate(calibrate::Args),
     /// Check logs: every checksum, every sample's and message's number, both clocks
     Audit(audit::Args),
     /// Give logs that a killed run left behind their end
@@ -86,6 +90,8 @@ enum Command {
     Sim(sim::Args),
     /// Make withheld cases on the simulated rig, diagnose them, and score the answers
     Blindtest(blindtest::Args),
+    /// Show what the rig is doing, over HTTP; with a token, control it
+    Serve(serve::Args),
     /// End a run from another terminal, as Ctrl-C does
     Stop(stop::Args),
 }
@@ -109,6 +115,7 @@ pub fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::main(&args),
         Command::Verify(args) => verify::main(&args),
         Command::Info(args) => info::main(&args),
+        Command::Calibrate(args) => calibrate::main(&args),
         Command::Audit(args) => audit::main(&args),
         Command::Recover(args) => recover::main(&args),
         Command::Prune(args) => prune::main(&args),
@@ -117,6 +124,7 @@ pub fn main() -> ExitCode {
         Command::Model(args) => model::main(&args),
         Command::Sim(args) => sim::main(&args),
         Command::Blindtest(args) => blindtest::main(&args),
+        Command::Serve(args) => serve::main(&args),
         Command::Stop(args) => stop::main(&args),
     };
     ExitCode::from(exit as u8)

@@ -48,17 +48,20 @@ pub struct Args {
     /// The rig [default: the simulated rig]
     #[arg(long, value_name = "FILE")]
     profile: Option<PathBuf>,
+    /// Calibration that `rigd calibrate` wrote, in place of the profile's
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     /// Directory of the logs
     #[arg(long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
     /// Seed of the simulated rig [default: 1]
-    #[arg(long, conflicts_with = "profile")]
+    #[arg(long)]
     seed: Option<u64>,
     /// Simulated rig: `max` runs as fast as it can, `1` in real time over pseudo-terminals [default: max]
     #[arg(long, value_enum, conflicts_with = "profile")]
     time_scale: Option<TimeScale>,
     /// Simulated rig: an effect that the model does not know; may be repeated. `list` names them
-    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',', conflicts_with = "profile")]
+    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     undocumented: Vec<String>,
     /// Who runs it, for the log
     #[arg(long, default_value = "")]
@@ -111,6 +114,8 @@ enum Refusal {
         "--model {model}: its gears are not those of the simulated rig, {pair}; give the pair that the model was made from with --pair"
     )]
     OtherGears { model: PathBuf, pair: String },
+    #[error("{option} is the simulated rig's, and profile '{profile}' has real ports; leave it out")]
+    SimulatedOnly { option: &'static str, profile: String },
     #[error("profile '{profile}' mixes port \"sim\" with real ports; all three devices are simulated, or none")]
     MixedPorts { profile: String },
 }
@@ -140,10 +145,13 @@ pub fn main(args: &Args) -> Exit {
 }
 
 fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::error::Error>> {
-    let profile = match &args.profile {
+    let mut profile = match &args.profile {
         Some(path) => Profile::load(path)?,
         None => Profile::simulated(),
     };
+    if let Some(calibration) = &args.calibration {
+        profile.calibrate(calibration)?;
+    }
     session::check_drivers(&profile)?;
     let (pair_toml, model) = pair::load(args.model.as_deref().or(args.pair.as_deref()))?;
     let plan = Plan {
@@ -164,12 +172,19 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
     if simulated == 1 || simulated == 2 {
         return Err(Box::new(Refusal::MixedPorts { profile: profile.name }));
     }
+    for (option, given) in [("--seed", args.seed.is_some()), ("--undocumented", !args.undocumented.is_empty())] {
+        if given && !profile.in_process() {
+            return Err(Box::new(Refusal::SimulatedOnly { option, profile: profile.name }));
+        }
+    }
     // The simulated rig's gears are those of the pair, with its documented errors and what is left undocumented; a model is
     // what it is compared with, and changes nothing on it.
     let spec = if profile.in_process() {
         let (plant_toml, plant) = pair::load(args.pair.as_deref())?;
         same_gears(args, &plant_toml, &pair_toml)?;
-        Some(sim::spec(&plant, &args.undocumented)?)
+        let mut spec = sim::spec(&plant, &args.undocumented)?;
+        sim::mount_discs(&mut spec, &profile);
+        Some(spec)
     } else {
         None
     };

@@ -8,8 +8,9 @@ use std::time::Duration;
 use async_trait::async_trait;
 use wire::asda_b2::{
     ALARM, ALARM_COMMUNICATION_TIMEOUT, AUX_RAM_ONLY, AUXILIARY, Alarm, CONTROL_MODE, FAULT_ACTION, FAULT_STOP,
-    FIRMWARE, FRAME_SILENCE_MS, INPUT_FUNCTIONS, INPUT_SOURCE, INPUTS, InputFunction, MAX_SPEED, MODE_SPEED, OUTPUTS,
-    Outputs, RAMP_DOWN, RAMP_UP, SPEED_1, STATUS_MONITOR, STATUS_MONITOR_CODE, WATCHDOG, monitor,
+    FIRMWARE, FRAME_SILENCE_MS, INPUT_FUNCTIONS, INPUT_SOURCE, INPUTS, InputFunction, MAX_SPEED, MODE_SPEED, MONITOR_1,
+    MONITOR_1_CODE, OUTPUTS, Outputs, RAMP_DOWN, RAMP_UP, SPEED_1, STATUS_MONITOR, STATUS_MONITOR_CODE, WATCHDOG,
+    monitor,
 };
 
 use super::bus::{Bus, BusStatistics, Manners};
@@ -157,6 +158,15 @@ impl Servo for AsdaB2 {
         let outputs = Outputs(decode(&OUTPUTS)? as u16);
         let alarm = if outputs.has(Outputs::ALARM) { self.bus.get(&ALARM).await? as u16 } else { 0 };
         Ok(ServoStatus { alarm, enabled: outputs.has(Outputs::SERVO_ON), motor_rpm })
+    }
+
+    async fn motor_torque_percent(&mut self) -> Result<Option<(f64, f64)>, DeviceError> {
+        // Monitor 1 for the torque, as the status monitor is for the speed; set once, it stays.
+        if self.bus.get(&MONITOR_1_CODE).await? as u16 != monitor::TORQUE {
+            self.bus.set(&MONITOR_1_CODE, f64::from(monitor::TORQUE)).await?;
+        }
+        let percent = self.bus.get(&MONITOR_1).await? * monitor::TORQUE_STEP_PERCENT;
+        Ok(Some((percent, monitor::TORQUE_STEP_PERCENT)))
     }
 
     fn statistics(&self) -> BusStatistics {

@@ -125,6 +125,14 @@ pub enum DeviceError {
         /// The drive's code and its meaning.
         alarm: String,
     },
+    /// The servo does not tell its torque.
+    #[error(
+        "servo on {port}: this drive does not tell its torque; calibrate the brake with a torque transducer, and write the curve into the profile"
+    )]
+    NoTorque {
+        /// Its port.
+        port: String,
+    },
     /// The servo has no watchdog of its own.
     #[error(
         "servo on {port}: register {register} (communication watchdog) reads back {read}, wanted {wanted}; without it the motor turns on when this program dies"
@@ -156,6 +164,10 @@ pub trait Servo {
     async fn set_motor_rpm(&mut self, rpm: f64) -> Result<(), DeviceError>;
     /// What it says of itself. Any transaction renews the lease.
     async fn status(&mut self) -> Result<ServoStatus, DeviceError>;
+    /// Motor torque in percent of the rated one, and the step in which it is told; `None` where the drive does not tell.
+    async fn motor_torque_percent(&mut self) -> Result<Option<(f64, f64)>, DeviceError> {
+        Ok(None)
+    }
     /// What happened on its line.
     fn statistics(&self) -> bus::BusStatistics;
 }

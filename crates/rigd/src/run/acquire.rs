@@ -96,6 +96,8 @@ pub struct Acquisition {
     te_zero_rad: Option<f64>,
     /// Index latches: seen, and the counter value there.
     index_counts: [Option<i64>; 2],
+    /// How far each disc is turned on its shaft, deg.
+    mounted_deg: [f64; 2],
     /// Last counts.
     counts: [i64; 2],
     /// What the rig is doing.
@@ -138,6 +140,7 @@ impl Acquisition {
             previous_theta1_rad: None,
             te_zero_rad: None,
             index_counts: [None; 2],
+            mounted_deg: [0.0; 2],
             counts: [0; 2],
             status: Status::default(),
             latest: Latest::default(),
@@ -159,6 +162,22 @@ impl Acquisition {
             output_sign: signs[1],
         };
         self.rescale();
+    }
+
+    /// The discs are turned on their shafts by this, deg: their indices pass so much later than usual.
+    pub fn set_mounting(&mut self, mounted_deg: [f64; 2]) {
+        self.mounted_deg = mounted_deg;
+    }
+
+    /// Latched counts of an index as they would be with the disc in its usual place.
+    ///
+    /// A disc turned by φ passes its index where the shaft stands at φ, so that θ = sign · 2π · (counts − index) / n + φ.
+    fn usual_index(&self, which: usize, latched: i64) -> i64 {
+        let (sign, counts_per_rev) = match which {
+            0 => (self.encoders.input_sign, self.encoders.input_counts_per_rev),
+            _ => (self.encoders.output_sign, self.encoders.output_counts_per_rev),
+        };
+        latched - (f64::from(sign) * self.mounted_deg[which] / 360.0 * counts_per_rev as f64).round() as i64
     }
 
     fn rescale(&mut self) {
@@ -235,8 +254,8 @@ impl Acquisition {
     /// The driven gear's index repeats every turn; the turn is taken that puts TE within half a turn of zero.
     pub fn home(&mut self) {
         let [Some(input), Some(output)] = self.index_counts else { return };
-        self.encoders.input_index_counts = input;
-        self.encoders.output_index_counts = output;
+        self.encoders.input_index_counts = self.usual_index(0, input);
+        self.encoders.output_index_counts = self.usual_index(1, output);
         self.rescale();
         let theta1 = self.theta1.angle_rad(self.counts[0]);
         let theta2 = self.theta2.angle_rad(self.counts[1]);

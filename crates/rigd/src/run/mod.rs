@@ -1,6 +1,7 @@
 //! One run of the rig, from connecting to the finalised log.
 
 pub mod acquire;
+pub mod brake_sweep;
 pub mod halt;
 pub mod progress;
 pub mod recorder;

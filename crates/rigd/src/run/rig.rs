@@ -273,13 +273,25 @@ impl Rig {
         Ok(self.servo.set_motor_rpm(sense * speed_rpm * self.profile.servo.reduction).await?)
     }
 
-    /// Load setpoint at the driven gear, N·m, by the brake's rising branch: from no current upwards.
+    /// Load setpoint at the driven gear, N·m, by the branch of the brake's curve on which the current then lies.
     ///
     /// # Errors
     /// [`Halt::Device`].
     pub async fn set_load(&mut self, load_nm: f64) -> Result<(), Halt> {
-        self.acquisition.borrow_mut().status.load_setpoint_nm = load_nm;
-        let current = self.profile.brake.current_a(load_nm).unwrap_or(0.0);
+        let from_a = {
+            let mut rig = self.acquisition.borrow_mut();
+            rig.status.load_setpoint_nm = load_nm;
+            rig.status.brake_current_a
+        };
+        let current = self.profile.brake.current_from_a(load_nm, from_a).unwrap_or(0.0);
+        self.set_coil_current(current).await
+    }
+
+    /// Current of the brake's coil, A: for its calibration, which has no curve yet.
+    ///
+    /// # Errors
+    /// [`Halt::Device`].
+    pub async fn set_coil_current(&mut self, current: f64) -> Result<(), Halt> {
         let lease_s = self.profile.sequence.lease_s;
         Ok(keep_lease(self.servo.as_mut(), lease_s, self.brake.set_current_a(current)).await?)
     }

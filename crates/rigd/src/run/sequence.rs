@@ -32,7 +32,7 @@ pub async fn execute(rig: &mut Rig, counter: Box<dyn Counter>, plan: &Plan) -> R
 }
 
 /// Identifies the devices, starts the encoders, and arms the drive's watchdog before it is enabled.
-async fn prepare(rig: &mut Rig, mut counter: Box<dyn Counter>, plan: &Plan) -> Result<(), Halt> {
+pub(super) async fn prepare(rig: &mut Rig, mut counter: Box<dyn Counter>, plan: &Plan) -> Result<(), Halt> {
     rig.enter(Phase::Idle);
     let servo = rig.servo.identify().await?;
     let brake = rig.brake.identify().await?;
@@ -41,6 +41,7 @@ async fn prepare(rig: &mut Rig, mut counter: Box<dyn Counter>, plan: &Plan) -> R
         let mut acquisition = rig.acquisition.borrow_mut();
         let signs = [rig.profile.counter.input_sign, rig.profile.counter.output_sign];
         acquisition.set_encoders(&encoders, signs);
+        acquisition.set_mounting([rig.profile.counter.input_mounted_deg, rig.profile.counter.output_mounted_deg]);
         acquisition.event(
             Level::Info,
             "identity",

@@ -86,6 +86,21 @@ struct Devices {
 /// # Errors
 /// [`LogError`] when the log cannot be made.
 pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -> Result<Outcome, LogError> {
+    let plan = setup.plan.clone();
+    conduct(setup, links, clock, stop, async |rig, counter| sequence::execute(rig, counter, &plan).await).await
+}
+
+/// As [`run`], with `body` in place of the sequence of a run; it need not switch off.
+///
+/// # Errors
+/// [`LogError`] when the log cannot be made.
+pub async fn conduct(
+    setup: Setup,
+    links: Links,
+    clock: Clock,
+    stop: StopRequests,
+    body: impl AsyncFnOnce(&mut Rig, Box<dyn Counter>) -> Result<(), Halt>,
+) -> Result<Outcome, LogError> {
     let run_id = uuid::Uuid::new_v4().to_string();
     let recorder = Recorder::create(
         &setup.path,
@@ -115,7 +130,7 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
                 stop,
                 progress,
             );
-            let halt = survive(sequence::execute(&mut rig, devices.counter, &setup.plan)).await.err();
+            let halt = survive(body(&mut rig, devices.counter)).await.err();
             if let Some(halt) = &halt {
                 acquisition.borrow().event(Level::Error, "halt", halt.to_string());
             }
@@ -201,6 +216,9 @@ fn describe(recorder: &Recorder, setup: &Setup, run_id: String, clock: Clock) {
     };
     attach("pair.toml", &setup.pair_toml);
     attach("rig.toml", &setup.profile.to_toml());
+    if let Some(calibration) = &setup.profile.calibration_toml {
+        attach(crate::calibration::ATTACHMENT, calibration);
+    }
 }
 
 async fn connect(profile: &Profile, links: Links) -> Result<Devices, Halt> {

@@ -118,6 +118,12 @@ pub fn spec(model: &NominalModel, undocumented: &[String]) -> Result<PlantSpec, 
     Ok(spec)
 }
 
+/// Turns the encoders' discs on their shafts as the profile says they are.
+pub fn mount_discs(spec: &mut PlantSpec, profile: &Profile) {
+    spec.encoders.input.clocking_rad += profile.counter.input_mounted_deg.to_radians();
+    spec.encoders.output.clocking_rad += profile.counter.output_mounted_deg.to_radians();
+}
+
 /// Starts the rig within this process, on the runtime's clock; needs a local task set.
 ///
 /// # Errors
