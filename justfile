@@ -29,3 +29,7 @@ pictures:
 bench-cpu:
     cargo build --release -p rigd
     python3 scripts/bench_cpu.py
+
+# Fuzzes every target for ten minutes at low priority (needs a nightly toolchain and cargo-fuzz); fuzz/run SECONDS TARGET... for less.
+fuzz SECONDS="600":
+    fuzz/run {{SECONDS}}

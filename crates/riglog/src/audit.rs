@@ -128,7 +128,8 @@ pub fn audit(parts: &LogParts) -> Result<Audit, LogError> {
     let mut sequence = SequenceAudit::default();
     let mut clock = ClockAudit::default();
     let (mut bytes, mut messages, mut continued) = (0, 0, false);
-    let mut losses_told = None;
+    // What the last state told, and what was missing by the numbers when it did.
+    let mut told: Option<(u64, u64)> = None;
     for path in parts.paths() {
         let (source, part_bytes) = open(path)?;
         check_channels(Walk::new(source, part_bytes, path)?)?;
@@ -159,7 +160,7 @@ pub fn audit(parts: &LogParts) -> Result<Audit, LogError> {
                             clock.batch(&batch, log_ns, path, &mut findings);
                         }
                         Topic::State => match RigState::decode(message.data) {
-                            Ok(state) => losses_told = Some(state.samples_lost),
+                            Ok(state) => told = Some((state.samples_lost, sequence.losses())),
                             Err(source) => findings.add(FindingKind::Damage, path, bad(source).to_string()),
                         },
                         _ => {}
@@ -183,8 +184,8 @@ pub fn audit(parts: &LogParts) -> Result<Audit, LogError> {
     }
     clock.end(parts.first(), &mut findings);
     let found = sequence.losses();
-    // The last state may be older than the last loss, never younger.
-    if let Some(told) = losses_told.filter(|told| *told > found || (*told < found && found > sequence.last_loss())) {
+    // The state may know of a loss whose next batch is not written yet, and be older than the last loss.
+    if let Some((told, _)) = told.filter(|(told, known)| told < known || *told > found) {
         let what = format!("the recorder counted {told} lost samples, their numbers say {found}");
         findings.add(FindingKind::Account, parts.first(), what);
     }
@@ -195,7 +196,7 @@ pub fn audit(parts: &LogParts) -> Result<Audit, LogError> {
         samples: sequence.samples(),
         losses: found,
         repeated: sequence.repeated(),
-        losses_told,
+        losses_told: told.map(|(told, _)| told),
         device_s: clock.device_s(),
         drift_ppm: clock.drift_ppm(),
         largest_delay_ms: clock.largest_delay_ms(),

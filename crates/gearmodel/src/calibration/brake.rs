@@ -188,6 +188,7 @@ mod tests {
                     torque_nm: torque_nm + 2.0 + 0.1 * n as f64 + noise,
                     scatter_nm: 0.02,
                     turns: 4,
+                    swing_nm: 1.0,
                 }
             });
         Sweep { readings: readings.collect() }

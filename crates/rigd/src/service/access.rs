@@ -87,10 +87,13 @@ impl Token {
     /// # Errors
     /// [`AccessError`] names the file and what to do; never the token.
     pub fn load(path: &Path) -> Result<Self, AccessError> {
-        use std::os::unix::fs::PermissionsExt as _;
+        use std::os::unix::fs::MetadataExt as _;
         let read = |source| AccessError::Read { path: path.into(), source };
-        let mode = std::fs::metadata(path).map_err(read)?.permissions().mode() & 0o777;
-        if mode & 0o077 != 0 {
+        let facts = std::fs::metadata(path).map_err(read)?;
+        let mode = facts.mode() & 0o777;
+        // A credential of systemd is root's, with an access list for the service's user; the mode then shows the list's mask as the group's.
+        let credential = facts.uid() == 0 && facts.gid() == 0 && mode & 0o037 == 0;
+        if mode & 0o077 != 0 && !credential {
             return Err(AccessError::Readable { path: path.into(), mode });
         }
         let text = std::fs::read_to_string(path).map_err(read)?;

@@ -12,7 +12,6 @@ pub(super) struct SequenceAudit {
     expected: u64,
     samples: u64,
     losses: u64,
-    last_loss: u64,
     repeated: u64,
     /// Number of the last message of each channel.
     last: [Option<u32>; Topic::ALL.len()],
@@ -27,11 +26,6 @@ impl SequenceAudit {
 
     pub(super) fn losses(&self) -> u64 {
         self.losses
-    }
-
-    /// Size of the loss that came last.
-    pub(super) fn last_loss(&self) -> u64 {
-        self.last_loss
     }
 
     pub(super) fn repeated(&self) -> u64 {
@@ -71,7 +65,6 @@ impl SequenceAudit {
         if first > self.expected {
             let missing = first - self.expected;
             self.losses = self.losses.saturating_add(missing);
-            self.last_loss = missing;
             let what = format!("samples {} to {} are missing ({missing})", self.expected, first - 1);
             findings.add(FindingKind::Samples, path, what);
         } else if first < self.expected {

@@ -28,7 +28,7 @@ function banner(text, kind) {
 }
 
 function number(value, digits, unit) {
-  return value === null || value === undefined || !isFinite(value) ? "–" : value.toFixed(digits) + (unit ? " " + unit : "");
+  return value === null || value === undefined || !isFinite(value) ? "–" : value.toFixed(digits).replace("-", "−") + (unit ? " " + unit : "");
 }
 
 function tile(name, text, kind = "") {
@@ -98,8 +98,8 @@ function steps(low, high, wanted) {
   return list;
 }
 
-function draw() {
-  const canvas = at("te");
+// Curves over the driver's angle: every revolution faint, the current one strong, and where there is one, the model dashed above.
+function plot(canvas, of, model) {
   const ratio = window.devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
@@ -109,15 +109,16 @@ function draw() {
   const c = canvas.getContext("2d");
   c.setTransform(ratio, 0, 0, ratio, 0, 0);
   c.clearRect(0, 0, width, height);
-  at("te-note").hidden = points.length > 0;
   if (!points.length) return;
   const style = getComputedStyle(document.documentElement);
   const colour = name => style.getPropertyValue("--" + name).trim();
-  const values = points.flatMap(p => [p.te, p.model]).map(v => v * ARCSEC);
-  let low = Math.min(...values), high = Math.max(...values);
-  const margin = Math.max((high - low) * 0.06, 1);
+  let low = Infinity, high = -Infinity;
+  for (const p of points) {
+    for (const v of model ? [of(p), model(p)] : [of(p)]) { low = Math.min(low, v); high = Math.max(high, v); }
+  }
+  const margin = Math.max((high - low) * 0.06, 0.5);
   low -= margin; high += margin;
-  const [left, right, top, bottom] = [62, 12, 8, 34];
+  const [left, right, top, bottom] = [62, 22, 8, 26];
   const x = angle => left + angle / (2 * Math.PI) * (width - left - right);
   const y = arcsec => top + (high - arcsec) / (high - low) * (height - top - bottom);
   c.font = "12px system-ui, sans-serif";
@@ -125,28 +126,25 @@ function draw() {
   c.strokeStyle = colour("line");
   c.lineWidth = 1;
   c.textAlign = "right"; c.textBaseline = "middle";
-  for (const v of steps(low, high, 6)) {
+  for (const v of steps(low, high, height > 250 ? 6 : 4)) {
     c.beginPath(); c.moveTo(left, y(v)); c.lineTo(width - right, y(v)); c.stroke();
-    c.fillText(String(Math.round(v * 100) / 100), left - 6, y(v));
+    c.fillText(String(Math.round(v * 100) / 100).replace("-", "−"), left - 6, y(v));
   }
   c.textAlign = "center"; c.textBaseline = "top";
   for (let degrees = 0; degrees <= 360; degrees += 60) {
     const px = x(degrees * Math.PI / 180);
     c.beginPath(); c.moveTo(px, top); c.lineTo(px, height - bottom); c.stroke();
-    c.fillText(degrees + "°", px, height - bottom + 5);
+    c.fillText(degrees + "°", px, height - bottom + 6);
   }
-  c.save(); c.translate(12, (height - bottom) / 2); c.rotate(-Math.PI / 2); c.textBaseline = "middle"; c.fillText("TE, arcsec", 0, 0); c.restore();
+  c.save(); c.translate(12, (height - bottom) / 2); c.rotate(-Math.PI / 2); c.textBaseline = "middle"; c.fillText("arcsec", 0, 0); c.restore();
 
-  const newest = {};
-  for (const p of points) newest[p.sense] = p;
-  const line = (list, of, dash, alpha, thick) => {
+  const line = (list, value, dash, alpha, thick) => {
     c.setLineDash(dash); c.globalAlpha = alpha; c.lineWidth = thick;
     c.beginPath();
     let before = null;
     for (const p of list) {
       const joined = before && Math.abs(p.angle - before.angle) < 0.1 && p.revolution === before.revolution && p.load === before.load;
-      const px = x(p.angle), py = y(of(p) * ARCSEC);
-      if (joined) c.lineTo(px, py); else c.moveTo(px, py);
+      if (joined) c.lineTo(x(p.angle), y(value(p))); else c.moveTo(x(p.angle), y(value(p)));
       before = p;
     }
     c.stroke();
@@ -155,17 +153,30 @@ function draw() {
   for (const [sense, name] of [[1, "ccw"], [-1, "cw"]]) {
     const own = points.filter(p => p.sense === sense);
     if (!own.length) continue;
-    const last = newest[sense];
+    const last = own[own.length - 1];
     const current = own.filter(p => p.revolution === last.revolution && p.load === last.load);
     c.strokeStyle = colour(name);
-    line(own, p => p.te, [], 0.28, 1);
-    line(current, p => p.te, [], 1, 1.8);
+    line(own, of, [], 0.3, 1);
+    line(current, of, [], 1, 1.8);
     c.strokeStyle = colour("ink");
-    line(own, p => p.model, [5, 4], 0.55, 1);
+    if (model) line(current, model, [2, 6], 0.8, 1);
   }
-  const pen = newest[points[points.length - 1].sense];
+  const pen = points[points.length - 1];
   c.fillStyle = colour(pen.sense > 0 ? "ccw" : "cw");
-  c.beginPath(); c.arc(x(pen.angle), y(pen.te * ARCSEC), 4, 0, 7); c.fill();
+  c.beginPath(); c.arc(x(pen.angle), y(of(pen)), 4, 0, 7); c.fill();
+}
+
+function draw() {
+  at("te-note").hidden = points.length > 0;
+  plot(at("te"), p => p.te * ARCSEC, p => p.model * ARCSEC);
+  // The zero of TE is the mounting's own: each sense and load by itself is looked at about its mean.
+  const means = new Map();
+  const key = p => p.sense + " " + p.load;
+  for (const p of points) {
+    const sum = means.get(key(p)) || [0, 0];
+    means.set(key(p), [sum[0] + p.te - p.model, sum[1] + 1]);
+  }
+  plot(at("gap"), p => (p.te - p.model - means.get(key(p))[0] / means.get(key(p))[1]) * ARCSEC, null);
 }
 
 async function step() {
