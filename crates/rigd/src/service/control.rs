@@ -150,7 +150,7 @@ mod tests {
         std::fs::write(plans.join("night.toml"), "").unwrap();
         std::fs::write(plans.join("notes.txt"), "").unwrap();
         std::fs::write(directory.path().join("secret.toml"), "").unwrap();
-        let control = Control::new("/bin/true".into(), Some(plans.clone()), directory.path().into(), None);
+        let control = Control::new("/bin/true".into(), Some(plans), directory.path().into(), None);
         assert_eq!(control.plans(), ["night.toml"]);
         for name in
             ["../secret.toml", "/etc/passwd", "deep.toml", "notes.txt", "", ".", "night.toml/", "plans/night.toml"]

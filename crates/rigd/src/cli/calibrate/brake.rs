@@ -93,7 +93,7 @@ pub fn main(args: &Args) -> Exit {
     let mean_ratio = setup.model.pair.closure();
     let running = stop::Running::register();
     let swept = Rc::new(RefCell::new(Swept::default()));
-    let outcome = execute(args, setup, plan.clone(), &swept);
+    let outcome = execute(args, setup, &plan, &swept);
     drop(running);
     match outcome {
         Err(error) => {
@@ -169,7 +169,7 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
     Ok((setup, sweep))
 }
 
-fn execute(args: &Args, setup: Setup, plan: SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<Outcome, String> {
+fn execute(args: &Args, setup: Setup, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<Outcome, String> {
     let simulated = setup.profile.in_process();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(simulated).build();
     let runtime = runtime.map_err(|error| error.to_string())?;
@@ -183,7 +183,7 @@ fn execute(args: &Args, setup: Setup, plan: SweepPlan, swept: &Rc<RefCell<Swept>
             Links::default()
         };
         let clock = if simulated { Clock::simulated() } else { Clock::real() };
-        let body = async |rig: &mut _, counter| brake_sweep::execute(rig, counter, &plan, swept).await;
+        let body = async |rig: &mut _, counter| brake_sweep::execute(rig, counter, plan, swept).await;
         session::conduct(setup, links, clock, stop, body).await.map_err(|error| error.to_string())
     })
 }
