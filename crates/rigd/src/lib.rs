@@ -7,6 +7,7 @@
 
 pub mod analysis;
 pub mod blind;
+pub mod campaign;
 pub mod chart;
 pub mod cli;
 pub mod clock;

@@ -72,7 +72,7 @@ fn record(
     let mut acquisition = Acquisition::new(recorder, Clock::simulated(), Analysis::new(model.clone()));
     let identity =
         CounterIdentity { text: String::new(), counts_per_rev: [COUNTS; 2], lines: [18_000; 2], max_rate_hz: 1e6 };
-    acquisition.set_encoders(&identity, [1, 1]);
+    acquisition.set_encoders(&identity, [1, 1], "none").expect("the first encoders");
     let mut source = Source {
         analysis: Analysis::new(model),
         sample: 0,

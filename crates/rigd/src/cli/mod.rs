@@ -2,6 +2,7 @@
 
 mod analyse;
 mod blindtest;
+mod campaign;
 mod diagnose;
 mod directions;
 mod import;
@@ -56,6 +57,8 @@ struct Cli {
 enum Command {
     /// Drive the rig, record a log, and compute TE and backlash
     Run(Box<run::Args>),
+    /// Measure by a plan, each run in a log of its own; goes on where it ended
+    Campaign(Box<campaign::Args>),
     /// Recompute TE and backlash from logs
     Replay(replay::Args),
     /// Order spectra, long and short waves, averages and noise floor of logs
@@ -92,6 +95,7 @@ pub fn main() -> ExitCode {
         .init();
     let exit = match Cli::parse().command {
         Command::Run(args) => run::main(&args),
+        Command::Campaign(args) => campaign::main(&args),
         Command::Replay(args) => replay::main(&args),
         Command::Analyse(args) => analyse::main(&args),
         Command::Diagnose(args) => diagnose::main(&args),
