@@ -476,7 +476,9 @@ impl Acquisition {
             // Nothing was sent before the first sample that there ever was.
             let first_ns = (i128::from(batch.device_time_ns) + offset_now).max(0) as u64;
             let dt_ns = u64::from(batch.dt_ns.max(1));
-            let periods = if self.samples == 0 { 1 } else { first_ns.saturating_sub(self.latest.sample_ns) / dt_ns };
+            // To the nearest: the end of an abandoned run lies a nanosecond past its last sample.
+            let since_ns = first_ns.saturating_sub(self.latest.sample_ns);
+            let periods = if self.samples == 0 { 1 } else { (since_ns + dt_ns / 2) / dt_ns };
             let number = self.next_sample + periods.max(1) - 1;
             self.number_offset = number.wrapping_sub(batch.first_sample);
         }
