@@ -46,7 +46,7 @@ pub struct Conductor {
     quiet: bool,
     /// Runs that this start has finished.
     pub finished: Vec<FinishedRun>,
-    /// Samples lost when the current log began.
+    /// Samples lost when the current run began.
     lost_before: u64,
     /// Why and how often it was interrupted.
     pub interruptions: Vec<String>,
@@ -154,7 +154,6 @@ impl Conductor {
         self.describe(&recorder, run);
         let before = rig.acquisition.borrow_mut().change_recorder(recorder);
         let current = self.current.replace(Current { run, path, finished: None });
-        self.lost_before = rig.acquisition.borrow().lost();
         let finished: Result<LogStatistics, LogError> = in_the_background(move || before.finish()).await;
         let finalised = finished.is_ok();
         if let Some(current) = current {
@@ -221,6 +220,8 @@ impl Attendant for Conductor {
         if !is_fresh {
             self.rotate(rig, run).await?;
         }
+        // What was lost before, with the rig at rest, is told in the log and is no loss of this run.
+        self.lost_before = rig.acquisition.borrow().lost();
         rig.progress.note(self.note(job_index));
         Ok(())
     }

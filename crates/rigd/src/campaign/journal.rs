@@ -63,7 +63,7 @@ pub struct FinishedRun {
     pub ended_ns: u64,
     /// Samples recorded.
     pub samples: u64,
-    /// Samples lost in its log.
+    /// Samples lost from its approach to its end.
     pub losses: u64,
     /// Mean of the mean TE curve, rad.
     #[serde(default)]

@@ -18,7 +18,7 @@ pub struct Report {
     pub planned: usize,
     /// Complete runs of all starts.
     pub runs: Vec<FinishedRun>,
-    /// Samples lost in the logs of complete runs.
+    /// Samples lost in complete runs, from approach to end.
     pub losses: u64,
     /// What changed between the first and the last reference run of each sense.
     pub drift: Vec<Drift>,

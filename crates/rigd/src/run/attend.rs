@@ -125,6 +125,10 @@ pub async fn attend(
         if let Err(halt) = wait(rig, remedy).await {
             return (Some(halt), troubles);
         }
+        // What went wrong with switching off is in the log, and remedied.
+        for trouble in troubles.drain(..) {
+            tracing::warn!("{trouble}");
+        }
         let what = format!("goes on after {:.1} s", waited.elapsed().as_secs_f64());
         rig.acquisition.borrow().event(Level::Info, "resume", what);
     }
