@@ -79,7 +79,7 @@ async fn disturb(bench: Bench, done: Rc<RefCell<Done>>, seed: u64) {
             }
             _ => {
                 done.borrow_mut().paused += 1;
-                bench.stop.toggle_pause();
+                bench.stop.pause();
                 // An operator's pause lasts in real time; long enough that it is due.
                 sleep(within(6, 8)).await;
                 bench.stop.go_on();
@@ -128,8 +128,8 @@ fn soak(hours: f64, seed: u64) {
     in_virtual_time(async {
         let bench = Bench::new(seed);
         let directory = bench.directory.path().to_owned();
-        // 20 runs take about 410 s of the rig's time without any fault.
-        let repeats = (hours * 3600.0 / 280.0).ceil();
+        // Twelve runs take about 250 s of the rig's time with their share of faults.
+        let repeats = (hours * 3600.0 / 250.0).ceil();
         let text = format!(
             "rate_hz = {:?}\norder = \"random\"\nrepeats = {repeats}\nreconnect_s = 120.0\n\
              [suspend]\ncool_to_c = 60.0\npatience_min = 30.0\nafter_emergency_stop = \"release\"\n\

@@ -77,12 +77,13 @@ enum Remedy {
 }
 
 impl Policy {
-    fn remedy(&self, halt: &Halt, lost: bool) -> Option<Remedy> {
+    fn remedy(&self, halt: &Halt) -> Option<Remedy> {
         match halt {
             Halt::Paused => Some(Remedy::AwaitOperator),
             Halt::Limit { key, .. } if [KEY_TEMPERATURE, KEY_HEAT].contains(key) => self.suspend.map(Remedy::Cool),
             Halt::EmergencyStop { .. } => self.suspend.map(Remedy::Release),
-            _ if lost && halt.lost_part().is_some() && self.reconnect_s > 0.0 => {
+            // It may be back already: a servo is called while the brake holds.
+            _ if halt.lost_part().is_some() && self.reconnect_s > 0.0 => {
                 Some(Remedy::Reconnect { patience_s: self.reconnect_s })
             }
             _ => None,
@@ -101,6 +102,10 @@ pub async fn attend(
     let mut troubles = Vec::new();
     loop {
         let halt = survive(sequence::execute(rig, job, attendant)).await.err();
+        let halt = match halt {
+            Some(halt) => Some(recognise(rig, halt).await),
+            None => None,
+        };
         let Some(halt) = halt else {
             troubles.extend(rig.switch_off(Event::Finished).await);
             return (None, troubles);
@@ -109,7 +114,7 @@ pub async fn attend(
         rig.acquisition.borrow().event(level, "halt", halt.to_string());
         troubles.extend(rig.switch_off(halt.event()).await);
         let attempts = if matches!(halt, Halt::Paused) { 0 } else { job.begin_again() };
-        let remedy = policy.remedy(&halt, rig.has_lost_devices()).filter(|_| !rig.stop.any());
+        let remedy = policy.remedy(&halt).filter(|_| !rig.stop.any());
         if let Err(failure) = attendant.interrupted(rig, &halt, remedy.is_some()).await {
             return (Some(failure), troubles);
         }
@@ -122,7 +127,7 @@ pub async fn attend(
             tracing::warn!("suspended: {halt}");
         }
         let waited = Instant::now();
-        if let Err(halt) = wait(rig, remedy).await {
+        if let Err(halt) = wait_through(rig, policy, remedy).await {
             return (Some(halt), troubles);
         }
         // What went wrong with switching off is in the log, and remedied.
@@ -131,6 +136,30 @@ pub async fn attend(
         }
         let what = format!("goes on after {:.1} s", waited.elapsed().as_secs_f64());
         rig.acquisition.borrow().event(Level::Info, "resume", what);
+    }
+}
+
+/// An emergency stop that is pressed while the servo is being prepared shows as an alarm, or as a servo that does not come on.
+async fn recognise(rig: &mut Rig, halt: Halt) -> Halt {
+    use crate::device::DeviceError::{Alarm, NotReached};
+    if !matches!(halt, Halt::Device(Alarm { .. } | NotReached { .. })) {
+        return halt;
+    }
+    match rig.servo.status().await {
+        Ok(status) if rig.servo.is_emergency_stop(status.alarm) => Halt::EmergencyStop { alarm: status.alarm },
+        _ => halt,
+    }
+}
+
+/// Waits for a remedy; a device that is lost meanwhile is waited for first, and then the remedy goes on.
+async fn wait_through(rig: &mut Rig, policy: Policy, remedy: Remedy) -> Result<(), Halt> {
+    loop {
+        let waited = wait(rig, remedy).await;
+        let lost = waited.as_ref().is_err_and(|halt| halt.lost_part().is_some()) && rig.has_lost_devices();
+        if !lost || policy.reconnect_s == 0.0 || matches!(remedy, Remedy::Reconnect { .. }) {
+            return waited;
+        }
+        rig.reconnect(policy.reconnect_s).await?;
     }
 }
 
@@ -160,7 +189,7 @@ async fn wait(rig: &mut Rig, remedy: Remedy) -> Result<(), Halt> {
                 // IEC 60204-1: releasing the button must not by itself start anything.
                 tracing::warn!("the emergency stop is released; press p or send SIGUSR1 to go on");
                 rig.acquisition.borrow().event(Level::Info, "resume", "released; waits for the operator".into());
-                rig.stop.toggle_pause();
+                rig.stop.pause();
                 await_operator(rig).await?;
             }
             Ok(())

@@ -166,7 +166,7 @@ mod tests {
     fn a_value_that_is_no_number_is_over_its_limit() {
         let nan = Observed { brake_temperature_c: f64::NAN, ..Observed::default() };
         assert_eq!(key(check(&limits(), &nan)), Some(KEY_TEMPERATURE));
-        assert_eq!(key(check(&limits(), &Observed { speed_rpm: f64::NAN, ..Observed::default() })).is_some(), true);
+        assert!(key(check(&limits(), &Observed { speed_rpm: f64::NAN, ..Observed::default() })).is_some());
     }
 
     #[test]

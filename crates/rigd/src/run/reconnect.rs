@@ -205,6 +205,8 @@ impl Rig {
         self.call_servo_by_name().await?;
         self.set_speed(None, 0.0).await?;
         self.lost[Part::Servo as usize] = false;
+        let what = "servo is back while the brake held, and was told to stop".into();
+        self.acquisition.borrow().event(Level::Info, "reconnect", what);
         Ok(())
     }
 }

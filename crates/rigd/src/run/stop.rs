@@ -51,6 +51,11 @@ impl StopRequests {
         self.pause.set(!self.pause.get());
     }
 
+    /// Asks for a pause.
+    pub fn pause(&self) {
+        self.pause.set(true);
+    }
+
     /// Takes a pause back.
     pub fn go_on(&self) {
         self.pause.set(false);

@@ -56,6 +56,10 @@ impl Process {
         kill(self.pid(), signal).expect("it is there");
     }
 
+    pub fn ended(&mut self) -> bool {
+        self.0.try_wait().expect("a child").is_some()
+    }
+
     pub fn wait(&mut self, seconds: f64) -> ExitStatus {
         wait_for("the end of the process", seconds, || self.0.try_wait().expect("a child"))
     }
