@@ -58,7 +58,7 @@ fn log(mut data: &[u8]) -> Option<Vec<u8>> {
             }
             6 => {
                 let text = String::from_utf8_lossy(content).into_owned();
-                let metadata = [("run_id", "x".to_owned()), ("part", sequence.to_string()), ("first_sample", text)];
+                let metadata = [("log_id", "x".to_owned()), ("part", sequence.to_string()), ("first_sample", text)];
                 let metadata = metadata.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
                 writer.write_metadata(&Metadata { name: PartMetadata::NAME.into(), metadata }).ok()?;
             }

@@ -8,6 +8,7 @@
 pub mod analysis;
 pub mod blind;
 pub mod calibration;
+pub mod campaign;
 pub mod chart;
 pub mod cli;
 pub mod clock;

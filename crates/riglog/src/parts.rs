@@ -1,7 +1,7 @@
 //! The parts of a log that was split while it was written: which files belong together, and in which order.
 //!
 //! Part 1 has the log's name, `x.mcap`; the next ones are `x.part2.mcap` and so on. What makes them one is not the name but the
-//! record `rig.part`: all carry the run's id and their number, and sample numbers go on from part to part.
+//! record `rig.part`: all carry the log's id and their number, and sample numbers go on from part to part.
 
 use std::path::{Path, PathBuf};
 
@@ -16,8 +16,8 @@ use crate::{
 /// Metadata record `rig.part`, at the head of each part of a log that may be split.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartMetadata {
-    /// UUID of the run, the same in every part.
-    pub run_id: String,
+    /// UUID of the log, the same in every part.
+    pub log_id: String,
     /// The part's number, from 1.
     pub part: u32,
     /// Number of the first sample that may stand in it: as many were written before.
@@ -34,7 +34,7 @@ impl PartMetadata {
     #[must_use]
     pub fn to_map(&self) -> MetadataMap {
         [
-            ("run_id", self.run_id.clone()),
+            ("log_id", self.log_id.clone()),
             ("part", self.part.to_string()),
             ("first_sample", self.first_sample.to_string()),
         ]
@@ -43,11 +43,11 @@ impl PartMetadata {
         .collect()
     }
 
-    /// Reads a record; `None` where it names no run or no number: such a file is a log of its own.
+    /// Reads a record; `None` where it names no log or no number: such a file is a log of its own.
     #[must_use]
     pub fn from_map(map: &MetadataMap) -> Option<Self> {
         Some(Self {
-            run_id: map.get("run_id").filter(|id| !id.is_empty())?.clone(),
+            log_id: map.get("log_id").filter(|id| !id.is_empty())?.clone(),
             part: map.get("part")?.trim().parse().ok().filter(|part| *part > 0)?,
             first_sample: map.get("first_sample").and_then(|text| text.trim().parse().ok()).unwrap_or(0),
         })
@@ -74,7 +74,7 @@ fn base_name(name: &str) -> &str {
 /// The files of one log, in order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogParts {
-    run_id: Option<String>,
+    log_id: Option<String>,
     files: Vec<(u32, PathBuf)>,
 }
 
@@ -86,7 +86,7 @@ impl LogParts {
     /// The file cannot be read or is no MCAP file.
     pub fn of(path: impl AsRef<Path>) -> Result<Self, LogError> {
         let path = path.as_ref();
-        let Some(this) = head(path)? else { return Ok(Self { run_id: None, files: vec![(1, path.to_owned())] }) };
+        let Some(this) = head(path)? else { return Ok(Self { log_id: None, files: vec![(1, path.to_owned())] }) };
         let mut files = vec![(this.part, path.to_owned())];
         let own = path.file_name().unwrap_or_default();
         let base = base_name(&own.to_string_lossy()).to_owned();
@@ -100,12 +100,12 @@ impl LogParts {
             }
             let beside = path.with_file_name(&name);
             if let Ok(Some(other)) = head(&beside)
-                && other.run_id == this.run_id
+                && other.log_id == this.log_id
             {
                 files.push((other.part, beside));
             }
         }
-        let mut parts = Self { run_id: Some(this.run_id), files };
+        let mut parts = Self { log_id: Some(this.log_id), files };
         parts.tidy();
         Ok(parts)
     }
@@ -118,7 +118,7 @@ impl LogParts {
         let mut logs: Vec<Self> = Vec::new();
         for path in paths {
             let log = Self::of(path)?;
-            let same = |other: &&mut Self| match (&other.run_id, &log.run_id) {
+            let same = |other: &&mut Self| match (&other.log_id, &log.log_id) {
                 (Some(one), Some(two)) => one == two,
                 _ => canonical(&other.files[0].1) == canonical(&log.files[0].1),
             };
@@ -136,7 +136,7 @@ impl LogParts {
     /// One file, taken as a whole log.
     #[must_use]
     pub fn alone(path: impl AsRef<Path>) -> Self {
-        Self { run_id: None, files: vec![(1, path.as_ref().to_owned())] }
+        Self { log_id: None, files: vec![(1, path.as_ref().to_owned())] }
     }
 
     /// The files, in order.
@@ -158,7 +158,7 @@ impl LogParts {
 
     /// The first part that is missing; `continued` says whether the last one is followed by another.
     pub(crate) fn missing(&self, continued: bool) -> Option<Defect> {
-        self.run_id.as_ref()?;
+        self.log_id.as_ref()?;
         let numbers = || self.files.iter().map(|(part, _)| *part);
         let gap = (1..).zip(numbers()).find(|(expected, found)| expected != found).map(|(expected, _)| expected);
         let last = numbers().next_back().unwrap_or(0);
@@ -208,9 +208,9 @@ mod tests {
 
     #[test]
     fn records_come_back_and_nonsense_is_no_part() {
-        let part = PartMetadata { run_id: "x".into(), part: 7, first_sample: 1 << 40 };
+        let part = PartMetadata { log_id: "x".into(), part: 7, first_sample: 1 << 40 };
         assert_eq!(PartMetadata::from_map(&part.to_map()), Some(part.clone()));
-        for (key, value) in [("part", "0"), ("part", "two"), ("run_id", "")] {
+        for (key, value) in [("part", "0"), ("part", "two"), ("log_id", "")] {
             let mut map = part.to_map();
             map.insert(key.into(), value.into());
             assert_eq!(PartMetadata::from_map(&map), None, "{key} = {value}");

@@ -4,6 +4,7 @@ mod analyse;
 mod audit;
 mod blindtest;
 mod calibrate;
+mod campaign;
 mod diagnose;
 mod directions;
 mod export;
@@ -62,6 +63,8 @@ struct Cli {
 enum Command {
     /// Drive the rig, record a log, and compute TE and backlash
     Run(Box<run::Args>),
+    /// Measure by a plan, each run in a log of its own; goes on where it ended
+    Campaign(Box<campaign::Args>),
     /// Recompute TE and backlash from logs
     Replay(replay::Args),
     /// Order spectra, long and short waves, averages and noise floor of logs
@@ -110,6 +113,7 @@ pub fn main() -> ExitCode {
         .init();
     let exit = match Cli::parse().command {
         Command::Run(args) => run::main(&args),
+        Command::Campaign(args) => campaign::main(&args),
         Command::Replay(args) => replay::main(&args),
         Command::Analyse(args) => analyse::main(&args),
         Command::Diagnose(args) => diagnose::main(&args),

@@ -12,6 +12,8 @@ use crate::clock::Clock;
 use crate::profile::Profile;
 use crate::quantity::{RATE, SPEED, TORQUE};
 use crate::run::Plan;
+use crate::run::attend::Policy;
+use crate::run::keys::Keys;
 use crate::run::rig::slip_power_w;
 use crate::run::session::{self, Links, Outcome, Setup};
 use crate::run::stop::StopRequests;
@@ -63,6 +65,12 @@ pub struct Args {
     /// Simulated rig: an effect that the model does not know; may be repeated. `list` names them
     #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     undocumented: Vec<String>,
+    /// Wait so long for a device that was unplugged, then do the interrupted run again [default: end the run]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
+    reconnect: f64,
+    /// Drive a servo that has no watchdog of its own; somebody must stay at the emergency stop
+    #[arg(long)]
+    accept_no_watchdog: bool,
     /// Who runs it, for the log
     #[arg(long, default_value = "")]
     operator: String,
@@ -84,10 +92,20 @@ fn loads(text: &str) -> Result<Loads, crate::quantity::QuantityError> {
     TORQUE.parse_list(text).map(Loads)
 }
 
+/// A time of 0 s to a day.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let value: f64 =
+        text.trim_end_matches('s').trim().parse().map_err(|_| format!("'{text}' is no time in s; write 30"))?;
+    if (0.0..=86_400.0).contains(&value) { Ok(value) } else { Err(format!("{text} is not within 0 and 86400 s")) }
+}
+
+/// How fast the simulated rig runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum TimeScale {
+pub enum TimeScale {
+    /// Real time.
     #[value(name = "1")]
     Real,
+    /// As fast as it can.
     Max,
 }
 
@@ -160,6 +178,7 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
         speed_rpm: args.rpm,
         revolutions: f64::from(args.revs),
         rate_hz: args.rate,
+        accept_no_watchdog: args.accept_no_watchdog,
     };
     refuse(&profile, &plan)?;
     if let Some(name) = args.undocumented.iter().find(|name| !sim::is_undocumented(name)) {
@@ -197,6 +216,7 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
         operator: args.operator.clone(),
         note: args.note.clone(),
         quiet: args.quiet,
+        policy: Policy { reconnect_s: args.reconnect, suspend: None },
     };
     Ok((setup, spec))
 }
@@ -250,7 +270,7 @@ fn refuse(profile: &Profile, plan: &Plan) -> Result<(), Refusal> {
 }
 
 /// Finalises what an earlier, killed run left behind.
-fn recover(directory: &Path) {
+pub fn recover(directory: &Path) {
     match riglog::recover_directory(directory) {
         Ok(logs) => {
             for (path, outcome) in logs {
@@ -350,6 +370,8 @@ fn in_runtime(
     let warnings = warnings(&setup);
     let outcome = LocalSet::new().block_on(&runtime, async move {
         let stop = StopRequests::listen().map_err(|error| format!("signals: {error}"))?;
+        stop.listen_for_pause().map_err(|error| format!("signals: {error}"))?;
+        let _keys = Keys::listen(&stop);
         let (links, _simulator) = connect(&mut setup)?;
         let clock = if simulated { Clock::simulated() } else { Clock::real() };
         session::run(setup, links, clock, stop).await.map_err(|error| error.to_string())

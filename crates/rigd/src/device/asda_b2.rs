@@ -7,13 +7,13 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use wire::asda_b2::{
-    ALARM, ALARM_COMMUNICATION_TIMEOUT, AUX_RAM_ONLY, AUXILIARY, Alarm, CONTROL_MODE, FAULT_ACTION, FAULT_STOP,
-    FIRMWARE, FRAME_SILENCE_MS, INPUT_FUNCTIONS, INPUT_SOURCE, INPUTS, InputFunction, MAX_SPEED, MODE_SPEED, MONITOR_1,
-    MONITOR_1_CODE, OUTPUTS, Outputs, RAMP_DOWN, RAMP_UP, SPEED_1, STATUS_MONITOR, STATUS_MONITOR_CODE, WATCHDOG,
-    monitor,
+    ALARM, ALARM_COMMUNICATION_TIMEOUT, ALARM_EMERGENCY_STOP, AUX_RAM_ONLY, AUXILIARY, Alarm, CONTROL_MODE,
+    FAULT_ACTION, FAULT_STOP, FIRMWARE, FRAME_SILENCE_MS, INPUT_FUNCTIONS, INPUT_SOURCE, INPUTS, InputFunction,
+    MAX_SPEED, MODE_SPEED, MONITOR_1, MONITOR_1_CODE, OUTPUTS, Outputs, RAMP_DOWN, RAMP_UP, SPEED_1, STATUS_MONITOR,
+    STATUS_MONITOR_CODE, WATCHDOG, monitor,
 };
 
-use super::bus::{Bus, BusStatistics, Manners};
+use super::bus::{Bus, BusError, BusStatistics, Manners};
 use super::{DeviceError, Identity, Servo, ServoStatus};
 use crate::link::{Address, Link};
 use crate::profile::ServoProfile;
@@ -68,16 +68,18 @@ impl AsdaB2 {
         let seconds = lease.as_secs_f64().ceil();
         for (register, value, name) in [(&WATCHDOG, seconds, "P3-04"), (&FAULT_ACTION, f64::from(FAULT_STOP), "P3-03")]
         {
-            self.bus.set(register, value).await?;
-            let read = self.bus.get(register).await?;
-            if read != value {
-                return Err(DeviceError::NoWatchdog {
-                    port: self.bus.port().to_owned(),
-                    register: name,
-                    read: read.to_string(),
-                    wanted: value.to_string(),
-                });
-            }
+            let set = self.bus.set(register, value).await;
+            let read = match set {
+                // A register that is not there, takes no value, or another one.
+                Err(BusError::Refused { code, .. }) => code.to_string(),
+                Err(BusError::ReadBack { read, .. }) => format!("{read:?}"),
+                other => {
+                    other?;
+                    continue;
+                }
+            };
+            let port = self.bus.port().to_owned();
+            return Err(DeviceError::NoWatchdog { port, register: name, read, wanted: value.to_string() });
         }
         Ok(())
     }
@@ -167,6 +169,10 @@ impl Servo for AsdaB2 {
         }
         let percent = self.bus.get(&MONITOR_1).await? * monitor::TORQUE_STEP_PERCENT;
         Ok(Some((percent, monitor::TORQUE_STEP_PERCENT)))
+    }
+
+    fn is_emergency_stop(&self, alarm: u16) -> bool {
+        alarm == ALARM_EMERGENCY_STOP
     }
 
     fn statistics(&self) -> BusStatistics {

@@ -10,9 +10,10 @@ use riglog::proto::{Level, Phase};
 
 use super::Plan;
 use super::halt::Halt;
+use super::job::Job;
 use super::rig::Rig;
 use super::sequence;
-use crate::device::{Counter, DeviceError};
+use crate::device::DeviceError;
 
 /// The coil is given this long for each new current, in times of the profile's `load_s`.
 const SETTLE: f64 = 2.0;
@@ -49,20 +50,16 @@ pub struct Swept {
 ///
 /// # Errors
 /// [`Halt`] says why it ended; the caller switches off.
-pub async fn execute(
-    rig: &mut Rig,
-    counter: Box<dyn Counter>,
-    plan: &SweepPlan,
-    swept: &Rc<RefCell<Swept>>,
-) -> Result<(), Halt> {
+pub async fn execute(rig: &mut Rig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<(), Halt> {
     let turning = Plan {
         directions: vec![Direction::Ccw],
         loads_nm: vec![0.0],
         speed_rpm: plan.speed_rpm,
         revolutions: f64::from(plan.turns),
         rate_hz: plan.rate_hz,
+        accept_no_watchdog: false,
     };
-    sequence::prepare(rig, counter, &turning).await?;
+    sequence::prepare(rig, &Job::of(&turning)).await?;
     rig.enter(Phase::Approach);
     rig.set_coil_current(0.0).await?;
     rig.set_speed(Some(Direction::Ccw), plan.speed_rpm).await?;
@@ -138,7 +135,8 @@ async fn read(
 /// One poll of everything: the driver's angle and its torque, N·m.
 async fn ask(rig: &mut Rig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<(f64, f64), Halt> {
     rig.tick().await?;
-    let Some((percent, step)) = rig.servo.motor_torque_percent().await? else {
+    let torque = rig.servo.motor_torque_percent().await;
+    let Some((percent, step)) = rig.note(torque)? else {
         return Err(Halt::Device(DeviceError::NoTorque { port: rig.profile.servo.port.clone() }));
     };
     let at_driver = |percent: f64| percent / 100.0 * plan.rated_torque_nm * rig.profile.servo.reduction;

@@ -76,13 +76,13 @@ impl Recorder {
     ///
     /// # Errors
     /// [`LogError`] when the file cannot be made.
-    pub fn create(path: &Path, options: WriterOptions, policy: &LogPolicy, run_id: &str) -> Result<Self, LogError> {
+    pub fn create(path: &Path, options: WriterOptions, policy: &LogPolicy) -> Result<Self, LogError> {
         let mut watch = SpaceWatch::new(path, policy);
         let first_look = watch.look();
         if let Space::Short(error) = first_look {
             return Err(error);
         }
-        let writer = RotatingWriter::create(path, options, policy.rotation(), run_id)?;
+        let writer = RotatingWriter::create(path, options, policy.rotation(), &uuid::Uuid::new_v4().to_string())?;
         let (queue, parcels) = sync_channel(QUEUE);
         let shared = Arc::new(Shared::default());
         let theirs = Arc::clone(&shared);

@@ -44,7 +44,7 @@ pub struct Control {
 }
 
 impl Control {
-    /// Control that starts plans of the directory `plans` by `program campaign PLAN --out OUT`.
+    /// Control that starts plans of the directory `plans` by `program campaign PLAN --out OUT/NAME`.
     #[must_use]
     pub fn new(program: PathBuf, plans: Option<PathBuf>, out: PathBuf, profile: Option<PathBuf>) -> Self {
         Self { program, plans, out, profile, started: Mutex::new(None) }
@@ -104,7 +104,8 @@ impl Control {
             return Err(ControlError::Busy);
         }
         let mut command = Command::new(&self.program);
-        command.arg("campaign").arg(directory.join(&name)).arg("--out").arg(&self.out);
+        let own = self.out.join(Path::new(&name).file_stem().unwrap_or_default());
+        command.arg("campaign").arg(directory.join(&name)).arg("--out").arg(own);
         if let Some(profile) = &self.profile {
             command.arg("--profile").arg(profile);
         }

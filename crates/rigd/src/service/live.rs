@@ -204,12 +204,12 @@ fn step(follower: &mut Follower, shared: &Shared) {
     }
 }
 
-/// The log that was written last; the first part of one that is split.
+/// The log that was written last, in the directory or in one of a campaign in it; the first part of one that is split.
 fn newest_log(directory: &Path) -> Option<PathBuf> {
-    let newest = std::fs::read_dir(directory)
-        .ok()?
-        .flatten()
-        .map(|entry| entry.path())
+    let inside =
+        |directory: &Path| std::fs::read_dir(directory).into_iter().flatten().flatten().map(|entry| entry.path());
+    let newest = inside(directory)
+        .flat_map(|path| if path.is_dir() { inside(&path).collect() } else { vec![path] })
         .filter(|path| path.extension().is_some_and(|extension| extension == "mcap"))
         .filter_map(|path| Some((std::fs::metadata(&path).ok()?.modified().unwrap_or(SystemTime::UNIX_EPOCH), path)))
         .max()?

@@ -41,6 +41,7 @@ impl Rotation {
 /// Writes one log in as many files as its [`Rotation`] makes of it.
 pub struct RotatingWriter {
     first: PathBuf,
+    log_id: String,
     options: WriterOptions,
     rotation: Rotation,
     writer: LogWriter,
@@ -65,7 +66,7 @@ struct Head {
 }
 
 impl RotatingWriter {
-    /// Creates the first part; `run_id` tells the parts of this log from those of any other.
+    /// Creates the first part; `log_id` tells the parts of this log from those of any other.
     ///
     /// # Errors
     /// As [`LogWriter::create`].
@@ -73,17 +74,16 @@ impl RotatingWriter {
         path: impl AsRef<Path>,
         options: WriterOptions,
         rotation: Rotation,
-        run_id: &str,
+        log_id: &str,
     ) -> Result<Self, LogError> {
         let first = path.as_ref().to_owned();
         let mut writer = LogWriter::create(&first, options.clone())?;
         if rotation.is_on() {
-            writer.part(&PartMetadata { run_id: run_id.to_owned(), part: 1, first_sample: 0 })?;
+            writer.part(&PartMetadata { log_id: log_id.to_owned(), part: 1, first_sample: 0 })?;
         }
-        let head =
-            Head { run: Some(RunMetadata { run_id: run_id.to_owned(), ..RunMetadata::default() }), ..Head::default() };
         Ok(Self {
             first,
+            log_id: log_id.to_owned(),
             options,
             rotation,
             writer,
@@ -91,7 +91,7 @@ impl RotatingWriter {
             opened_ns: None,
             ending: None,
             finished: Vec::new(),
-            head,
+            head: Head::default(),
             next_sample: 0,
         })
     }
@@ -259,8 +259,7 @@ impl RotatingWriter {
         let part = self.part + 1;
         let path = part_path(&self.first, part);
         let mut next = LogWriter::create(&path, self.options.clone())?;
-        let run_id = self.head.run.as_ref().map(|run| run.run_id.clone()).unwrap_or_default();
-        next.part(&PartMetadata { run_id, part, first_sample: self.next_sample })?;
+        next.part(&PartMetadata { log_id: self.log_id.clone(), part, first_sample: self.next_sample })?;
         self.head.write(&mut next, self.writer.sequences())?;
         let mut done = std::mem::replace(&mut self.writer, next);
         (self.part, self.opened_ns) = (part, None);

@@ -4,8 +4,10 @@ use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use gearmodel::Direction;
 use gearmodel::calibration::{BrakePoint, COVERAGE, Stated, brake_curves};
+use gearmodel::{Direction, NominalModel};
+use riglog::RunMetadata;
+use riglog::proto::Level;
 use serde_json::json;
 use tokio::task::LocalSet;
 
@@ -18,9 +20,12 @@ use crate::quantity::{SPEED, TORQUE};
 use crate::run::Plan;
 use crate::run::brake_sweep::{self, SweepPlan, Swept};
 use crate::run::halt::Halt;
-use crate::run::rig::slip_power_w;
-use crate::run::session::{self, Links, Outcome, Setup};
+use crate::run::limits::slip_power_w;
+use crate::run::recorder::Recorder;
+use crate::run::rig::Rig;
+use crate::run::session::{self, Links, LogHead, Outcome, Stage};
 use crate::run::stop::StopRequests;
+use crate::run::supervisor::Event;
 use crate::{pair, sim};
 
 /// Sampling while the torque is what counts, Hz.
@@ -70,6 +75,14 @@ pub struct Args {
     operator: String,
     #[command(flatten)]
     output: Output,
+}
+
+/// A rig, and where the log of its calibration goes.
+struct Setup {
+    path: PathBuf,
+    profile: Profile,
+    model: NominalModel,
+    head: LogHead,
 }
 
 /// What is refused before anything moves.
@@ -155,16 +168,14 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
         speed_rpm: args.rpm,
         revolutions: f64::from(args.turns),
         rate_hz: RATE_HZ,
+        accept_no_watchdog: false,
     };
+    let note = "calibration of the brake".into();
     let setup = Setup {
         path: session::log_path(&args.logs, &plan),
-        plan,
         profile,
         model,
-        pair_toml,
-        operator: args.operator.clone(),
-        note: "calibration of the brake".into(),
-        quiet: true,
+        head: LogHead { operator: args.operator.clone(), note, pair_toml, plan_toml: None },
     };
     Ok((setup, sweep))
 }
@@ -183,8 +194,24 @@ fn execute(args: &Args, setup: Setup, plan: &SweepPlan, swept: &Rc<RefCell<Swept
             Links::default()
         };
         let clock = if simulated { Clock::simulated() } else { Clock::real() };
-        let body = async |rig: &mut _, counter| brake_sweep::execute(rig, counter, plan, swept).await;
-        session::conduct(setup, links, clock, stop, body).await.map_err(|error| error.to_string())
+        let options = session::writer_options(&setup.profile);
+        let recorder = Recorder::create(&setup.path, options, &setup.profile.log).map_err(|error| error.to_string())?;
+        let conditions = RunMetadata {
+            direction: Direction::Ccw.to_string(),
+            speed_rpm: vec![plan.speed_rpm],
+            ..RunMetadata::default()
+        };
+        setup.head.describe(&recorder, &setup.profile, conditions, clock);
+        let stage = Stage { profile: setup.profile, model: setup.model, revolutions: 0.0, quiet: true };
+        let body = async |rig: &mut Rig| {
+            let halt = session::survive(brake_sweep::execute(rig, plan, swept)).await.err();
+            if let Some(halt) = &halt {
+                rig.acquisition.borrow().event(Level::Error, "halt", halt.to_string());
+            }
+            let troubles = rig.switch_off(halt.as_ref().map_or(Event::Finished, Halt::event)).await;
+            (halt, troubles)
+        };
+        Ok(session::on_rig(stage, recorder, links, clock, stop, body).await)
     })
 }
 
