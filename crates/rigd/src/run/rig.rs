@@ -373,8 +373,16 @@ impl Rig {
     pub async fn set_load(&mut self, load_nm: f64) -> Result<(), Halt> {
         self.acquisition.borrow_mut().status.load_setpoint_nm = load_nm;
         let current = self.profile.brake.current_a(load_nm).unwrap_or(0.0);
+        self.set_coil_current(current).await
+    }
+
+    /// Current of the brake's coil, A.
+    ///
+    /// # Errors
+    /// [`Halt::Device`].
+    pub async fn set_coil_current(&mut self, current_a: f64) -> Result<(), Halt> {
         let lease_s = self.profile.sequence.lease_s;
-        let set = self.brake.set_current_a(current);
+        let set = self.brake.set_current_a(current_a);
         let set = keep_lease(self.servo.as_mut(), &mut self.heard, lease_s, set).await;
         self.note(set)
     }
