@@ -88,6 +88,49 @@ fn an_unplugged_device() {
 }
 
 #[test]
+fn the_emergency_stop() {
+    let mut sim = Sim::start(5);
+    let profile = sim.profile(|_| {});
+    let mut run = recording(&sim, &profile);
+    let since = SystemTime::now();
+    sim.tell("estop press");
+    // The drive takes the torque away by itself: no lease and no ramp.
+    stands("emergency stop", &sim, since, MARGIN_S);
+    let ended = run.wait(20.0);
+    assert_eq!(ended.code, Some(5), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("emergency stop was pressed") && ended.stderr.contains("release"),
+        "{}",
+        ended.stderr
+    );
+    run.assert_whole();
+    // Pressed, nothing starts; released, the next run does.
+    let refused = Run::with_profile(&profile, &["--revs", "1", "--direction", "ccw"]).wait(20.0);
+    assert_eq!(refused.code, Some(5), "{}", refused.stderr);
+    assert!(!sim.shafts().iter().rev().take(200).any(|shaft| shaft.servo_on));
+    sim.tell("estop release");
+    std::thread::sleep(Duration::from_millis(200));
+    let next = Run::with_profile(&profile, &["--revs", "1", "--direction", "ccw"]).wait(60.0);
+    assert_eq!(next.code, Some(0), "{}", next.stderr);
+}
+
+#[test]
+fn a_drive_without_a_watchdog() {
+    let mut sim = Sim::start(6);
+    sim.tell("no-watchdog");
+    let profile = sim.profile(|_| {});
+    std::thread::sleep(Duration::from_millis(200));
+    let refused = Run::with_profile(&profile, &["--revs", "1", "--direction", "ccw"]).wait(20.0);
+    assert_eq!(refused.code, Some(5), "{}", refused.stderr);
+    assert!(refused.stderr.contains("P3-04") && refused.stderr.contains("watchdog"), "{}", refused.stderr);
+    assert!(!sim.shafts().iter().any(|shaft| shaft.servo_on), "it was never switched on");
+    let accepted = ["--revs", "1", "--direction", "ccw", "--accept-no-watchdog"];
+    let accepted = Run::with_profile(&profile, &accepted).wait(60.0);
+    assert_eq!(accepted.code, Some(0), "{}", accepted.stderr);
+    assert!(accepted.stderr.contains("ACCEPTED WITHOUT A WATCHDOG"), "{}", accepted.stderr);
+}
+
+#[test]
 fn a_full_disk() {
     let sim = Sim::start(3);
     let profile = sim.profile(|_| {});

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use async_trait::async_trait;
 use gearmodel::measure::RunFigures;
+use riglog::RunMetadata;
 use riglog::proto::Level;
-use riglog::{LogError, LogStatistics, RunMetadata};
 
 use super::CampaignError;
 use super::estimate::{Estimate, time};
@@ -19,6 +19,7 @@ use crate::run::job::{Kind, RunSpec};
 use crate::run::recorder::Recorder;
 use crate::run::rig::Rig;
 use crate::run::session::{LogHead, writer_options};
+use crate::run::supervisor::State;
 
 /// Logs of runs that were not finished; out of the way of `rigd diagnose DIR/*.mcap`.
 pub const UNFINISHED: &str = "unfinished";
@@ -41,11 +42,10 @@ pub struct Conductor {
     /// The schedule's index of each of the job's runs.
     indices: Vec<usize>,
     estimate: Estimate,
-    journal: Journal,
+    /// Out of the house only while another thread writes it.
+    journal: Option<Journal>,
     current: Option<Current>,
     quiet: bool,
-    /// Runs that this start has finished.
-    pub finished: Vec<FinishedRun>,
     /// Samples lost when the current run began.
     lost_before: u64,
     /// Why and how often it was interrupted.
@@ -71,10 +71,9 @@ impl Conductor {
             schedule,
             indices,
             estimate,
-            journal,
+            journal: Some(journal),
             current: None,
             quiet,
-            finished: Vec::new(),
             lost_before: 0,
             interruptions: Vec::new(),
         }
@@ -86,12 +85,13 @@ impl Conductor {
     /// [`Halt::Log`], [`Halt::Journal`].
     pub fn begin(&mut self) -> Result<Recorder, Halt> {
         let first = self.indices.first().copied().unwrap_or(0);
-        self.journal.write(&Line::Began {
+        let began = Line::Began {
             plan: self.schedule.fingerprint.clone(),
             at: now(),
             operator: self.head.operator.clone(),
             first,
-        })?;
+        };
+        self.write(&began)?;
         let path = self.free_path(first);
         let recorder = Recorder::create(&path, writer_options(&self.profile), &self.profile.log)?;
         self.describe(&recorder, first);
@@ -104,19 +104,23 @@ impl Conductor {
     /// # Errors
     /// [`CampaignError::Io`].
     pub fn conclude(&mut self, finalised: bool, halt: Option<&Halt>) -> Result<(), CampaignError> {
-        if let Some(current) = self.current.take() {
-            self.close(current, finalised)?;
+        if let (Some(current), Some(journal)) = (self.current.take(), &mut self.journal) {
+            close(journal, &self.directory, current, finalised)?;
         }
         if let Some(halt) = halt {
-            self.journal.write(&Line::Interrupted { at: now(), why: halt.to_string(), goes_on: false })?;
+            self.write(&Line::Interrupted { at: now(), why: halt.to_string(), goes_on: false })?;
         }
         Ok(())
+    }
+
+    fn write(&mut self, line: &Line) -> Result<(), CampaignError> {
+        self.journal.as_mut().map_or(Ok(()), |journal| journal.write(line))
     }
 
     /// Complete runs of all starts.
     #[must_use]
     pub fn all_finished(&self) -> &[FinishedRun] {
-        &self.journal.finished
+        self.journal.as_ref().map_or(&[], |journal| &journal.finished)
     }
 
     fn describe(&self, recorder: &Recorder, run: usize) {
@@ -145,32 +149,32 @@ impl Conductor {
         self.directory.join(name)
     }
 
-    /// Goes on in a new log for `run`; the one before is finalised, on other threads, so that no sample waits.
-    async fn rotate(&mut self, rig: &Rig, run: usize) -> Result<(), Halt> {
+    /// Goes on in a new log for `run`; the one before is finalised and entered in the journal, on other threads, so that neither
+    /// encoders nor servo wait for a disk.
+    async fn rotate(&mut self, rig: &mut Rig, run: usize) -> Result<(), Halt> {
         let path = self.free_path(run);
         let (at, options, policy) = (path.clone(), writer_options(&self.profile), self.profile.log.clone());
-        let made: Result<Recorder, LogError> = in_the_background(move || Recorder::create(&at, options, &policy)).await;
+        let (made, trouble) = in_the_background(rig, move || Recorder::create(&at, options, &policy)).await;
         let recorder = made?;
         self.describe(&recorder, run);
         let before = rig.acquisition.borrow_mut().change_recorder(recorder);
-        let current = self.current.replace(Current { run, path, finished: None });
-        let finished: Result<LogStatistics, LogError> = in_the_background(move || before.finish()).await;
-        let finalised = finished.is_ok();
-        if let Some(current) = current {
-            self.close(current, finalised)?;
-        }
-        finished.map(drop).map_err(Halt::Log)
-    }
-
-    fn close(&mut self, current: Current, finalised: bool) -> Result<(), CampaignError> {
-        match current.finished {
-            Some(finished) if finalised => {
-                self.journal.write(&Line::Finished(finished.clone()))?;
-                self.finished.push(*finished);
-                Ok(())
-            }
-            _ => put_aside(&self.directory, &current.path),
-        }
+        let closing = self.current.replace(Current { run, path, finished: None });
+        let (directory, journal) = (self.directory.clone(), self.journal.take());
+        let (closed, other_trouble) = in_the_background(rig, move || {
+            let mut journal = journal;
+            let finished = before.finish();
+            let entered = match (closing, &mut journal) {
+                (Some(closing), Some(journal)) => close(journal, &directory, closing, finished.is_ok()),
+                _ => Ok(()),
+            };
+            (journal, finished, entered)
+        })
+        .await;
+        let (journal, finished, entered) = closed;
+        self.journal = journal;
+        finished.map_err(Halt::Log)?;
+        entered?;
+        trouble.or(other_trouble).map_or(Ok(()), Err)
     }
 
     /// What is left, for the progress line.
@@ -245,7 +249,7 @@ impl Attendant for Conductor {
             // Told when the last log is finalised.
             return Ok(());
         }
-        self.journal.write(&Line::Interrupted { at: now(), why: halt.to_string(), goes_on })?;
+        self.write(&Line::Interrupted { at: now(), why: halt.to_string(), goes_on })?;
         if matches!(halt, Halt::Paused) {
             return Ok(());
         }
@@ -274,10 +278,26 @@ pub fn put_aside(directory: &Path, log: &Path) -> Result<(), CampaignError> {
     }
 }
 
-/// Files do not hold up the encoders: their work is done on a thread of its own.
-async fn in_the_background<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
-    match tokio::task::spawn_blocking(work).await {
-        Ok(done) => done,
+/// A finished run goes into the journal once its log is whole; any other log goes aside.
+fn close(journal: &mut Journal, directory: &Path, closing: Current, finalised: bool) -> Result<(), CampaignError> {
+    match closing.finished {
+        Some(finished) if finalised => journal.write(&Line::Finished(finished)),
+        _ => put_aside(directory, &closing.path),
+    }
+}
+
+/// Work with files on a thread of its own; a rig that is on is polled meanwhile, for its lease runs. Also why it has to stop.
+async fn in_the_background<T: Send + 'static>(
+    rig: &mut Rig,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> (T, Option<Halt>) {
+    let work = tokio::task::spawn_blocking(work);
+    let mut trouble = None;
+    while matches!(rig.state(), State::Standing | State::Turning) && !work.is_finished() && trouble.is_none() {
+        trouble = rig.tick().await.err();
+    }
+    match work.await {
+        Ok(done) => (done, trouble),
         Err(failure) => match failure.try_into_panic() {
             // The thread's panic goes on in ours: the message was printed where it arose.
             Ok(panic) => std::panic::resume_unwind(panic),

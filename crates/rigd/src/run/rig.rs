@@ -384,9 +384,9 @@ impl Rig {
     ///
     /// # Errors
     /// [`Halt::Device`].
-    pub async fn set_coil_current(&mut self, current: f64) -> Result<(), Halt> {
+    pub async fn set_coil_current(&mut self, current_a: f64) -> Result<(), Halt> {
         let lease_s = self.profile.sequence.lease_s;
-        let set = self.brake.set_current_a(current);
+        let set = self.brake.set_current_a(current_a);
         let set = keep_lease(self.servo.as_mut(), &mut self.heard, lease_s, set).await;
         self.note(set)
     }

@@ -52,7 +52,10 @@ fn heed_pause(rig: &Rig) -> Result<(), Halt> {
 }
 
 /// Identifies the devices, starts the encoders, and arms the drive's watchdog before it is enabled.
-pub(super) async fn prepare(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
+///
+/// # Errors
+/// [`Halt`], among them [`DeviceError::NoWatchdog`] for a drive that has none.
+pub async fn prepare(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
     rig.enter(Phase::Idle);
     let servo = rig.servo.identify().await;
     let servo = rig.note(servo)?;
@@ -87,6 +90,8 @@ pub(super) async fn prepare(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
     // It may be on even where that could not be confirmed; a stop then takes the longer way.
     rig.tell(Event::ServoOn);
     rig.note(enabled)?;
+    // Switching on takes its time and asks the drive all along.
+    rig.heard = tokio::time::Instant::now();
     let before = rig.acquisition.borrow().samples();
     rig.until("the first encoder samples", 2.0, |acquisition| acquisition.samples() > before).await
 }

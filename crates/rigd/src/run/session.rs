@@ -22,6 +22,7 @@ use super::reconnect::{Dialer, Redial};
 use super::recorder::{Entry, Recorder};
 use super::rig::{Devices, Rig};
 use super::stop::StopRequests;
+use super::supervisor::Event;
 use crate::analysis::Analysis;
 use crate::clock::Clock;
 use crate::device::{self, UnknownDriver};
@@ -137,37 +138,35 @@ pub async fn conduct(
     stop: StopRequests,
 ) -> Outcome {
     let Work { profile, model, mut job, policy, quiet } = work;
-    let revolutions = job.revolutions();
-    let stage = Stage { profile, model, revolutions, quiet };
-    on_rig(stage, recorder, links, clock, stop, async |rig| attend(rig, &mut job, policy, attendant).await).await
+    let progress = Progress::new(job.revolutions(), quiet);
+    let frame = Frame { profile, model, recorder, progress, links, clock, stop };
+    with_rig(frame, async |rig| attend(rig, &mut job, policy, attendant).await).await
 }
 
-/// A rig, and what is shown of the work on it.
-pub struct Stage {
+/// What a session on the rig needs, whatever is done in it.
+pub struct Frame {
     /// The rig.
     pub profile: Profile,
     /// The model in force.
     pub model: NominalModel,
-    /// Revolutions to record, for the progress line.
-    pub revolutions: f64,
-    /// No progress line.
-    pub quiet: bool,
+    /// The log.
+    pub recorder: Recorder,
+    /// The progress line.
+    pub progress: Progress,
+    /// The links to the devices.
+    pub links: Links,
+    /// The host's clock.
+    pub clock: Clock,
+    /// The operator's wishes.
+    pub stop: StopRequests,
 }
 
-/// Connects, lets `body` work and switch off, and finalises the log that is then being written. `body` gives the reason for an early end, and what
-/// went wrong while switching off.
-pub async fn on_rig(
-    stage: Stage,
-    recorder: Recorder,
-    links: Links,
-    clock: Clock,
-    stop: StopRequests,
-    body: impl AsyncFnOnce(&mut Rig) -> (Option<Halt>, Vec<String>),
-) -> Outcome {
+/// Connects, lets `body` do its work, which leaves the rig off, and finalises the log that is then being written. [`attend`] is a body;
+/// so is [`once`] around anything else.
+pub async fn with_rig(frame: Frame, body: impl AsyncFnOnce(&mut Rig) -> (Option<Halt>, Vec<String>)) -> Outcome {
     let _size_limit = outlive_size_limit();
-    let Stage { profile, model, revolutions, quiet } = stage;
+    let Frame { profile, model, recorder, progress, links, clock, stop } = frame;
     let acquisition = Rc::new(RefCell::new(Acquisition::new(recorder, clock, Analysis::new(model))));
-    let progress = Progress::new(revolutions, quiet);
     let dialer = Dialer::new(profile.clone(), links.again.clone());
     let (halt, mut troubles) = match connect(&dialer, links).await {
         Ok(devices) => {
@@ -201,6 +200,16 @@ pub async fn on_rig(
         }
     }
     Outcome { analysis, halt, troubles, lost, unwritten, finalised }
+}
+
+/// Does some work on the rig once, and switches off whatever came of it, a panic too.
+pub async fn once(rig: &mut Rig, work: impl AsyncFnOnce(&mut Rig) -> Result<(), Halt>) -> (Option<Halt>, Vec<String>) {
+    let halt = survive(work(&mut *rig)).await.err();
+    if let Some(halt) = &halt {
+        rig.acquisition.borrow().event(Level::Error, "halt", halt.to_string());
+    }
+    let troubles = rig.switch_off(halt.as_ref().map_or(Event::Finished, Halt::event)).await;
+    (halt, troubles)
 }
 
 /// Leaves a rig that is off: ends the stream, and says what the lines were like.

@@ -7,7 +7,6 @@ use std::rc::Rc;
 use gearmodel::calibration::{BrakePoint, COVERAGE, Stated, brake_curves};
 use gearmodel::{Direction, NominalModel};
 use riglog::RunMetadata;
-use riglog::proto::Level;
 use serde_json::json;
 use tokio::task::LocalSet;
 
@@ -21,11 +20,11 @@ use crate::run::Plan;
 use crate::run::brake_sweep::{self, SweepPlan, Swept};
 use crate::run::halt::Halt;
 use crate::run::limits::slip_power_w;
+use crate::run::progress::Progress;
 use crate::run::recorder::Recorder;
 use crate::run::rig::Rig;
-use crate::run::session::{self, Links, LogHead, Outcome, Stage};
+use crate::run::session::{self, Frame, Links, LogHead, Outcome};
 use crate::run::stop::StopRequests;
-use crate::run::supervisor::Event;
 use crate::{pair, sim};
 
 /// Sampling while the torque is what counts, Hz.
@@ -202,16 +201,11 @@ fn execute(args: &Args, setup: Setup, plan: &SweepPlan, swept: &Rc<RefCell<Swept
             ..RunMetadata::default()
         };
         setup.head.describe(&recorder, &setup.profile, conditions, clock);
-        let stage = Stage { profile: setup.profile, model: setup.model, revolutions: 0.0, quiet: true };
-        let body = async |rig: &mut Rig| {
-            let halt = session::survive(brake_sweep::execute(rig, plan, swept)).await.err();
-            if let Some(halt) = &halt {
-                rig.acquisition.borrow().event(Level::Error, "halt", halt.to_string());
-            }
-            let troubles = rig.switch_off(halt.as_ref().map_or(Event::Finished, Halt::event)).await;
-            (halt, troubles)
-        };
-        Ok(session::on_rig(stage, recorder, links, clock, stop, body).await)
+        let Setup { profile, model, .. } = setup;
+        let progress = Progress::new(0.0, true);
+        let frame = Frame { profile, model, recorder, progress, links, clock, stop };
+        let sweep = async |rig: &mut Rig| brake_sweep::execute(rig, plan, swept).await;
+        Ok(session::with_rig(frame, async |rig| session::once(rig, sweep).await).await)
     })
 }
 
