@@ -73,11 +73,13 @@ pub struct Audit {
     pub messages: u64,
     /// Samples read.
     pub samples: u64,
-    /// Samples missing by their numbers, those before the first one included.
+    /// Number of the first sample: 0, but in the later logs of a campaign, whose counter goes on.
+    pub first_sample: u64,
+    /// Samples missing by their numbers from the first one on.
     pub losses: u64,
     /// Samples that stand twice or out of order.
     pub repeated: u64,
-    /// Losses as the recorder counted them; `None` where no state says.
+    /// Losses as the recorder counted them from the first state to the last; `None` where no state says.
     pub losses_told: Option<u64>,
     /// Device time from first to last sample, s.
     pub device_s: f64,
@@ -128,8 +130,9 @@ pub fn audit(parts: &LogParts) -> Result<Audit, LogError> {
     let mut sequence = SequenceAudit::default();
     let mut clock = ClockAudit::default();
     let (mut bytes, mut messages, mut continued) = (0, 0, false);
-    // What the last state told, and what was missing by the numbers when it did.
-    let mut told: Option<(u64, u64)> = None;
+    // What the first state told, what the last one told, and what was missing by the numbers when it did: a campaign's later logs begin with the
+    // losses of the earlier ones.
+    let mut told: Option<(u64, u64, u64)> = None;
     for path in parts.paths() {
         let (source, part_bytes) = open(path)?;
         check_channels(Walk::new(source, part_bytes, path)?)?;
@@ -160,7 +163,10 @@ pub fn audit(parts: &LogParts) -> Result<Audit, LogError> {
                             clock.batch(&batch, log_ns, path, &mut findings);
                         }
                         Topic::State => match RigState::decode(message.data) {
-                            Ok(state) => told = Some((state.samples_lost, sequence.losses())),
+                            Ok(state) => {
+                                let first = told.map_or(state.samples_lost, |(first, ..)| first);
+                                told = Some((first, state.samples_lost, sequence.losses()));
+                            }
                             Err(source) => findings.add(FindingKind::Damage, path, bad(source).to_string()),
                         },
                         _ => {}
@@ -185,7 +191,10 @@ pub fn audit(parts: &LogParts) -> Result<Audit, LogError> {
     clock.end(parts.first(), &mut findings);
     let found = sequence.losses();
     // The state may know of a loss whose next batch is not written yet, and be older than the last loss.
-    if let Some((told, _)) = told.filter(|(told, known)| told < known || *told > found) {
+    let losses_told = told.map(|(first, last, _)| last.saturating_sub(first));
+    if let Some((told, known)) = losses_told.zip(told.map(|(_, _, known)| known))
+        && (told < known || told > found)
+    {
         let what = format!("the recorder counted {told} lost samples, their numbers say {found}");
         findings.add(FindingKind::Account, parts.first(), what);
     }
@@ -194,9 +203,10 @@ pub fn audit(parts: &LogParts) -> Result<Audit, LogError> {
         bytes,
         messages,
         samples: sequence.samples(),
+        first_sample: sequence.first_sample(),
         losses: found,
         repeated: sequence.repeated(),
-        losses_told: told.map(|(told, _)| told),
+        losses_told,
         device_s: clock.device_s(),
         drift_ppm: clock.drift_ppm(),
         largest_delay_ms: clock.largest_delay_ms(),

@@ -42,6 +42,7 @@ fn json(audit: &Audit) -> Value {
         "parts": audit.parts.iter().map(|path| path.display().to_string()).collect::<Vec<_>>(),
         "bytes": audit.bytes,
         "messages": audit.messages,
+        "first_sample": audit.first_sample,
         "samples": audit.samples,
         "losses": audit.losses,
         "losses_told": audit.losses_told,

@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn late_batches_are_no_drift_and_a_drifting_crystal_is_no_step() {
         // 50 ppm slow, every seventh batch up to 0.4 s late.
-        let late = |t: f64| if (t * 100.0) as u64 % 7 == 0 { 0.004 } else { 0.0 };
+        let late = |t: f64| if ((t * 100.0) as u64).is_multiple_of(7) { 0.004 } else { 0.0 };
         let (clock, findings) = watched(300, |t| t * (1.0 + 50e-6) + 0.002 + late(t));
         assert!(findings.list.is_empty(), "{:?}", findings.list);
         let drift = clock.drift_ppm().unwrap();

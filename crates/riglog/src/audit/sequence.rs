@@ -8,8 +8,9 @@ use crate::{proto::AngleBatch, topic::Topic};
 /// Follows the numbers through all parts of a log.
 #[derive(Debug, Default)]
 pub(super) struct SequenceAudit {
-    /// Number that the next sample shall have.
-    expected: u64,
+    /// Number that the next sample shall have; `None` before the first.
+    expected: Option<u64>,
+    first_sample: u64,
     samples: u64,
     losses: u64,
     repeated: u64,
@@ -22,6 +23,10 @@ pub(super) struct SequenceAudit {
 impl SequenceAudit {
     pub(super) fn samples(&self) -> u64 {
         self.samples
+    }
+
+    pub(super) fn first_sample(&self) -> u64 {
+        self.first_sample
     }
 
     pub(super) fn losses(&self) -> u64 {
@@ -62,17 +67,24 @@ impl SequenceAudit {
     pub(super) fn batch(&mut self, batch: &AngleBatch, path: &Path, findings: &mut Findings) {
         let (first, count) = (batch.first_sample, batch.len() as u64);
         self.samples += count;
-        if first > self.expected {
-            let missing = first - self.expected;
+        let expected = match self.expected {
+            Some(expected) => expected,
+            None => {
+                self.first_sample = first;
+                first
+            }
+        };
+        if first > expected {
+            let missing = first - expected;
             self.losses = self.losses.saturating_add(missing);
-            let what = format!("samples {} to {} are missing ({missing})", self.expected, first - 1);
+            let what = format!("samples {expected} to {} are missing ({missing})", first - 1);
             findings.add(FindingKind::Samples, path, what);
-        } else if first < self.expected {
-            let twice = (self.expected - first).min(count);
+        } else if first < expected {
+            let twice = (expected - first).min(count);
             self.repeated += twice;
-            let what = format!("{twice} samples from number {first} on stand where {} was expected", self.expected);
+            let what = format!("{twice} samples from number {first} on stand where {expected} was expected");
             findings.add(FindingKind::Samples, path, what);
         }
-        self.expected = self.expected.max(first.saturating_add(count));
+        self.expected = Some(expected.max(first.saturating_add(count)));
     }
 }

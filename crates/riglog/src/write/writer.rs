@@ -88,6 +88,8 @@ impl LogWriter {
     /// The file exists, or the operating system refuses.
     pub fn create(path: impl AsRef<Path>, options: WriterOptions) -> Result<Self, LogError> {
         let path = path.as_ref();
+        // Made before the file is: a process that is killed in between shall not leave an empty one.
+        let encoder = encoder(path, &options)?;
         let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|source| {
             if source.kind() == io::ErrorKind::AlreadyExists {
                 LogError::Exists { path: path.to_owned() }
@@ -98,11 +100,12 @@ impl LogWriter {
         // The file is ours by its creation; a recovery that looks into the directory right now lets go at once.
         file.lock().map_err(LogError::io("lock", path))?;
         let for_sync = file.try_clone().map_err(LogError::io("open", path))?;
-        sync_directory_of(path);
-        Self::on(path, Box::new(file), move || for_sync.sync_data(), options).inspect_err(|_| {
+        let log = Self::on(path, Box::new(file), move || for_sync.sync_data(), options, encoder).inspect_err(|_| {
             // Nothing was written; an empty file would only puzzle the next start.
             let _ = std::fs::remove_file(path);
-        })
+        })?;
+        sync_directory_of(path);
+        Ok(log)
     }
 
     fn on(
@@ -110,9 +113,8 @@ impl LogWriter {
         store: Box<dyn Store>,
         sync: impl FnMut() -> io::Result<()> + Send + 'static,
         options: WriterOptions,
+        mut encoder: Encoder,
     ) -> Result<Self, LogError> {
-        let mut encoder = Encoder::new(&options.library, options.compression_level, channels())
-            .map_err(|error| LogError::Compress { path: path.to_owned(), bytes: 0, source: io_error(error) })?;
         let sync_period = Duration::from_millis(options.sync_period_ms.into());
         let mut output = Output::new(path, store, sync, sync_period)?;
         output.hand_over(encoder.take(), 0)?;
@@ -371,6 +373,15 @@ impl LogWriter {
     }
 }
 
+/// The encoder of a log at `path`, with its head.
+fn encoder(path: &Path, options: &WriterOptions) -> Result<Encoder, LogError> {
+    Encoder::new(&options.library, options.compression_level, channels()).map_err(|error| LogError::Compress {
+        path: path.to_owned(),
+        bytes: 0,
+        source: io_error(error),
+    })
+}
+
 /// The channels of a rig log, each with a schema of its own number.
 fn channels() -> Vec<Arc<mcap::Channel<'static>>> {
     let channel = |topic: Topic| mcap::Channel {
@@ -416,7 +427,8 @@ mod tests {
 
     fn writer(disk: &FullDisk, period_ms: u32) -> LogWriter {
         let options = WriterOptions { chunk_period_ms: period_ms, ..WriterOptions::new("test") };
-        LogWriter::on(Path::new("x.mcap"), Box::new(disk.clone()), || Ok(()), options).unwrap()
+        let encoder = encoder(Path::new("x.mcap"), &options).unwrap();
+        LogWriter::on(Path::new("x.mcap"), Box::new(disk.clone()), || Ok(()), options, encoder).unwrap()
     }
 
     fn texts(bytes: &[u8]) -> (Vec<String>, Completeness) {
@@ -515,7 +527,8 @@ mod tests {
             Ok(())
         };
         let options = WriterOptions { chunk_period_ms: 5, sync_period_ms: 50, ..WriterOptions::new("test") };
-        let mut log = LogWriter::on(Path::new("x.mcap"), Box::new(disk.clone()), sync, options).unwrap();
+        let encoder = encoder(Path::new("x.mcap"), &options).unwrap();
+        let mut log = LogWriter::on(Path::new("x.mcap"), Box::new(disk.clone()), sync, options, encoder).unwrap();
         let began = Instant::now();
         let mut n = 0;
         while began.elapsed() < Duration::from_millis(500) {
