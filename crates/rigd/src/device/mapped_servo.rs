@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 
-use super::bus::BusStatistics;
+use super::bus::{BusError, BusStatistics};
 use super::map::{Map, Mapped, ServoRules, Step};
 use super::{DeviceError, Identity, Servo, ServoStatus};
 use crate::link::{Address, Link};
@@ -77,11 +77,16 @@ impl MappedServo {
         }
         for step in &steps {
             let wanted = step.value(quantities);
-            self.device.set(&step.set, wanted).await?;
-            let read = self.device.get(&step.set).await?;
-            if read != wanted {
-                return Err(lacking(step.set.clone(), read.to_string(), wanted.to_string(), self.port()));
-            }
+            let read = match self.device.set(&step.set, wanted).await {
+                // A register that is not there, takes no value, or another one.
+                Err(BusError::Refused { code, .. }) => code.to_string(),
+                Err(BusError::ReadBack { read, .. }) => format!("{read:?}"),
+                other => {
+                    other?;
+                    continue;
+                }
+            };
+            return Err(lacking(step.set.clone(), read, wanted.to_string(), self.port()));
         }
         Ok(())
     }
@@ -173,6 +178,16 @@ impl Servo for MappedServo {
         };
         let alarm = if fault { self.alarm_code().await? } else { 0 };
         Ok(ServoStatus { alarm, enabled, motor_rpm })
+    }
+
+    async fn motor_torque_percent(&mut self) -> Result<Option<(f64, f64)>, DeviceError> {
+        let Some(name) = self.rules.status.torque.clone() else { return Ok(None) };
+        let register = self.device.register(&name);
+        Ok(Some((self.device.bus.get(&register).await?, register.scale)))
+    }
+
+    fn is_emergency_stop(&self, alarm: u16) -> bool {
+        self.rules.emergency_stop_alarm == Some(alarm)
     }
 
     fn statistics(&self) -> BusStatistics {

@@ -160,6 +160,9 @@ impl Check<'_> {
         self.unit(&["servo", "speed_set"], &servo.speed_set, "rpm");
         self.unit(&["servo", "max_speed"], &servo.max_speed, "rpm");
         self.unit(&["servo", "status", "speed"], &servo.status.speed, "rpm");
+        if let Some(torque) = &servo.status.torque {
+            self.unit(&["servo", "status", "torque"], torque, "%");
+        }
         let reset = servo.own_watchdog_alarm.as_ref().map_or(&[][..], |alarm| &alarm.reset);
         for (key, steps) in [
             ("before_alarm_reset", &servo.before_alarm_reset[..]),

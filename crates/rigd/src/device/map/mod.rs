@@ -260,6 +260,8 @@ pub struct ServoRules {
     pub status: ServoStatusRules,
     /// The alarm that its watchdog leaves, and how it is reset.
     pub own_watchdog_alarm: Option<WatchdogAlarm>,
+    /// The alarm that the input of its emergency stop leaves; without it, that is an alarm as any other.
+    pub emergency_stop_alarm: Option<u16>,
 }
 
 /// What a servo says of itself.
@@ -268,6 +270,8 @@ pub struct ServoRules {
 pub struct ServoStatusRules {
     /// Motor speed, rpm.
     pub speed: String,
+    /// Motor torque, % of the rated one; without it the drive does not tell.
+    pub torque: Option<String>,
     /// The motor is energised.
     pub enabled: Test,
     /// An alarm is active.

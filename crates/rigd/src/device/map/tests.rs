@@ -25,6 +25,7 @@ fn the_drive_of_the_map_is_the_drive_of_the_codec() {
         ("firmware", &asda_b2::FIRMWARE),
         ("alarm", &asda_b2::ALARM),
         ("status_monitor_code", &asda_b2::STATUS_MONITOR_CODE),
+        ("torque_code", &asda_b2::MONITOR_1_CODE),
         ("outputs", &asda_b2::OUTPUTS),
         ("speed_1", &asda_b2::SPEED_1),
         ("ramp_up", &asda_b2::RAMP_UP),
@@ -45,6 +46,19 @@ fn the_drive_of_the_map_is_the_drive_of_the_codec() {
             "{name}"
         );
     }
+}
+
+#[test]
+fn the_drive_of_the_map_tells_its_torque_and_its_emergency_stop() {
+    let map = map("asda-b2");
+    let servo = map.servo.as_ref().expect("a servo");
+    let name = servo.status.torque.as_deref().expect("it tells its torque");
+    let ours = map.register(name, None).expect("listed");
+    assert_eq!((ours.address, ours.kind), (asda_b2::MONITOR_1.address, asda_b2::MONITOR_1.kind));
+    assert_eq!((ours.scale, &*ours.unit), (asda_b2::monitor::TORQUE_STEP_PERCENT, "%"));
+    let shown = servo.prepare.iter().find(|step| step.set == "torque_code").expect("the monitor shows the torque");
+    assert_eq!(shown.value(&[]), f64::from(asda_b2::monitor::TORQUE));
+    assert_eq!(servo.emergency_stop_alarm, Some(asda_b2::ALARM_EMERGENCY_STOP));
 }
 
 #[test]
