@@ -94,11 +94,13 @@ impl LogWriter {
         // The file is ours by its creation; a recovery that looks into the directory right now lets go at once.
         file.lock().map_err(LogError::io("lock", path))?;
         let for_sync = file.try_clone().map_err(LogError::io("open", path))?;
-        sync_directory_of(path);
-        Self::on(path, Box::new(file), move || for_sync.sync_data(), options).inspect_err(|_| {
+        let writer = Self::on(path, Box::new(file), move || for_sync.sync_data(), options).inspect_err(|_| {
             // Nothing was written; an empty file would only puzzle the next start.
             let _ = std::fs::remove_file(path);
-        })
+        })?;
+        // After the header, for a kill during the sync must not leave an empty file.
+        sync_directory_of(path);
+        Ok(writer)
     }
 
     fn on(
