@@ -88,20 +88,24 @@ fn kill_at(instant: Instance, revolutions: &str, seed: u64) -> Left {
     let log = run.log().expect("a log");
     let mut messages = 0;
     let mut last_sample_ns = None;
-    let mut next = None;
+    let mut next: Option<u64> = None;
+    let mut told = String::new();
     for record in LogReader::open(&log).expect("a readable log") {
         match record.expect("whole records") {
             Record::Angles { log_time_ns, batch, .. } => {
-                assert!(
-                    next.is_none_or(|next| next == batch.first_sample),
-                    "a gap before sample {}",
-                    batch.first_sample
-                );
+                // On a crowded computer the line itself may lose samples; the log then says so before it goes on.
+                let first = batch.first_sample;
+                let gap = next.filter(|next| *next != first).map(|next| format!("samples {next} to {} ", first - 1));
+                assert!(gap.is_none_or(|gap| told.contains(&gap)), "a gap before sample {first} that nobody told");
                 next = Some(batch.first_sample + batch.input_delta.len() as u64);
                 last_sample_ns = Some(log_time_ns);
                 messages += 1;
             }
-            Record::State { .. } | Record::Te { .. } | Record::Backlash { .. } | Record::Event { .. } => messages += 1,
+            Record::Event { event, .. } => {
+                told.push_str(&event.message);
+                messages += 1;
+            }
+            Record::State { .. } | Record::Te { .. } | Record::Backlash { .. } => messages += 1,
             _ => {}
         }
     }

@@ -104,6 +104,7 @@ impl LogWriter {
             // Nothing was written; an empty file would only puzzle the next start.
             let _ = std::fs::remove_file(path);
         })?;
+        // After the header, for a kill during the sync must not leave an empty file.
         sync_directory_of(path);
         Ok(log)
     }
