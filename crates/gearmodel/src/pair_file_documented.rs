@@ -136,8 +136,7 @@ impl PairFile {
             let name = effect.effect.name();
             if name == "count_loss" {
                 left_out.push(format!(
-                    "{name}: {} steps were found; when counts get lost again cannot be foreseen: see to the wiring",
-                    effect.shape.len()
+                    "{name}: counts were lost; when that happens again cannot be foreseen: see to the wiring"
                 ));
                 continue;
             }
@@ -192,7 +191,9 @@ mod tests {
                         "excited_by" => "\"turn\"".to_owned(),
                         "tooth" | "n" | "order" => "3.0".to_owned(),
                         "lines" => "1000.0".to_owned(),
-                        "counts" | "steps" => continue,
+                        "response" => "\"carried\"".to_owned(),
+                        // Counts are stated by their steps here.
+                        "counts" | "steps" | "rate_rad_per_rev" => continue,
                         _ => format!("{:?}", 0.1 + 0.01 * n as f64),
                     };
                     text.push_str(&format!("{name} = {value}\n"));

@@ -2,7 +2,7 @@
 //! In the output shaft the encoder reads θ2 + (β²/4) sin(2θ2 − φ); in the input shaft gear 1 stands at θ1 + (β²/4) sin(2θ1 − φ),
 //! seen as i times that.
 
-use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
+use super::{Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
 
 /// Misalignment of the coupling in the input or output shaft.
 pub(super) struct CouplingMisalignment(pub(super) Shaft);
@@ -23,8 +23,7 @@ impl Effect for CouplingMisalignment {
     }
 
     fn signature(&self) -> Signature {
-        let carrier = if self.0 == Shaft::Input { Carrier::Input } else { Carrier::Output };
-        Signature::steady(carrier, Parity::Even)
+        Signature::steady(self.0.carrier(), Parity::Even)
     }
 
     fn applies(&self, _rig: &Rig) -> bool {
@@ -36,13 +35,7 @@ impl Effect for CouplingMisalignment {
     }
 
     fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
-        let (angle_rad, gain) = match self.0 {
-            Shaft::Input => (at.theta1_rad, at.ratio),
-            Shaft::Output => (at.theta2_rad, 1.0),
-        };
-        let (sin, cos) = (2.0 * angle_rad).sin_cos();
-        row[0] = gain * sin;
-        row[1] = gain * cos;
+        at.wave(self.0, 2.0, if self.0 == Shaft::Input { at.ratio } else { 1.0 }, row);
     }
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {

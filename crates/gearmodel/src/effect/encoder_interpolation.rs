@@ -2,18 +2,17 @@
 //! unequal amplitudes or quadrature: order 2), reading θ + a sin(h·L·θ − φ). Averaging over angle bins hides it; it is found
 //! on the samples (`gap::line_phase`). The shape is [order h, lines L].
 
-use super::encoder_eccentricity::reading_error;
 use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
+
+/// Names by encoder: these effects are found on the samples, not on the places.
+pub(crate) const NAMES: [&str; 2] = ["encoder1_interpolation", "encoder2_interpolation"];
 
 /// Interpolation error of the input or output encoder.
 pub(super) struct EncoderInterpolation(pub(super) Shaft);
 
 impl Effect for EncoderInterpolation {
     fn name(&self) -> &'static str {
-        match self.0 {
-            Shaft::Input => "encoder1_interpolation",
-            Shaft::Output => "encoder2_interpolation",
-        }
+        NAMES[usize::from(self.0 == Shaft::Output)]
     }
 
     fn component(&self) -> &'static str {
@@ -42,7 +41,7 @@ impl Effect for EncoderInterpolation {
 
     fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
         if let [order, lines] = shape[..] {
-            reading_error(self.0, order * lines, at, row);
+            at.reading_error(self.0, order * lines, row);
         }
     }
 

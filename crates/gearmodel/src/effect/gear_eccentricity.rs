@@ -3,7 +3,7 @@
 //! By the increment along the common normal, with a = dir·(α ∓ μ) (`increment::common_normal`):
 //! TE = [dx sin(θ1 + a) + dy cos(θ1 + a)]/A for gear 1, [dx sin(θ2 − a) + dy cos(θ2 − a)]/A for gear 2.
 
-use super::{Carrier, Effect, Estimate, Fold, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+use super::{Effect, Estimate, Fold, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
 
 /// Eccentricity of gear 1 (input) or gear 2 (output) against the documented one.
 pub(super) struct GearEccentricity(pub(super) Shaft);
@@ -24,8 +24,7 @@ impl Effect for GearEccentricity {
     }
 
     fn signature(&self) -> Signature {
-        let carrier = if self.0 == Shaft::Input { Carrier::Input } else { Carrier::Output };
-        Signature::steady(carrier, Parity::Mixed)
+        Signature::steady(self.0.carrier(), Parity::Mixed)
     }
 
     fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {

@@ -3,7 +3,7 @@
 //! the stretch on one pair begins at u = start. The empty shape takes the stretches from the tips of the documented teeth.
 
 use super::{
-    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
+    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
     StatedError, Station, stated,
 };
 
@@ -52,8 +52,8 @@ impl Effect for MeshStiffnessVariation {
         shapes
     }
 
-    fn sharp(&self) -> bool {
-        true
+    fn grain(&self) -> Grain {
+        Grain::Sharp
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {

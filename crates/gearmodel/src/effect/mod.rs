@@ -20,8 +20,7 @@ mod centre_distance_error;
 mod count_loss;
 mod coupling_misalignment;
 mod documented;
-mod encoder_eccentricity;
-mod encoder_ellipticity;
+mod encoder_disc;
 mod encoder_interpolation;
 mod friction_windup;
 mod gear_eccentricity;
@@ -46,10 +45,14 @@ mod wear_drift;
 
 pub use documented::{Documented, Fold, Term};
 pub use polar::Estimate;
-pub use rig::Rig;
+pub use rig::{MeshOrders, Rig};
 pub use signature::{Accumulates, Carrier, Parity, Signature};
 pub use stated::{Given, Stated, StatedEffect, StatedError};
-pub use station::{LEDGER_LOADS, Ledger, Plan, Station};
+pub use station::{Grain, LEDGER_LOADS, Ledger, Plan, Station};
+
+pub(crate) use encoder_interpolation::NAMES as INTERPOLATION;
+
+use encoder_disc::{EncoderDisc, Order};
 
 /// Shaft that an effect sits on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +61,17 @@ pub enum Shaft {
     Input,
     /// The driven one.
     Output,
+}
+
+impl Shaft {
+    /// What repeats with its angle.
+    #[must_use]
+    pub fn carrier(self) -> Carrier {
+        match self {
+            Self::Input => Carrier::Input,
+            Self::Output => Carrier::Output,
+        }
+    }
 }
 
 /// Values of the parameters in which a trace is not linear; which they are, the effect knows. Empty where there are none.
@@ -146,13 +160,13 @@ pub trait Effect: Sync {
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]);
 
     /// True where the trace differs between revolutions of one condition.
-    fn evolves(&self) -> bool {
+    fn evolves(&self, _shape: &Shape) -> bool {
         false
     }
 
-    /// True where the trace jumps with the teeth: it is then averaged over an angle bin, as the samples are.
-    fn sharp(&self) -> bool {
-        false
+    /// How fine the trace is: it is averaged over an angle bin as the samples are.
+    fn grain(&self) -> Grain {
+        Grain::Smooth
     }
 
     /// True where a negative amplitude has no meaning.
@@ -196,10 +210,10 @@ pub static LIBRARY: &[&dyn Effect] = &[
     &pitch_errors::PitchErrors,
     &profile_error::ProfileError,
     &tooth_damage::ToothDamage,
-    &encoder_eccentricity::EncoderEccentricity(Shaft::Input),
-    &encoder_eccentricity::EncoderEccentricity(Shaft::Output),
-    &encoder_ellipticity::EncoderEllipticity(Shaft::Input),
-    &encoder_ellipticity::EncoderEllipticity(Shaft::Output),
+    &EncoderDisc { shaft: Shaft::Input, order: Order::Eccentricity },
+    &EncoderDisc { shaft: Shaft::Output, order: Order::Eccentricity },
+    &EncoderDisc { shaft: Shaft::Input, order: Order::Ellipticity },
+    &EncoderDisc { shaft: Shaft::Output, order: Order::Ellipticity },
     &encoder_interpolation::EncoderInterpolation(Shaft::Input),
     &encoder_interpolation::EncoderInterpolation(Shaft::Output),
     &coupling_misalignment::CouplingMisalignment(Shaft::Input),

@@ -51,8 +51,8 @@ impl Effect for PitchCurveError {
         row[0] = if shape[..] == [1.0] { at.theta1_rad } else { rig.theta2_slope_over_k(at.theta2_rad).unwrap_or(0.0) };
     }
 
-    fn evolves(&self) -> bool {
-        true
+    fn evolves(&self, shape: &Shape) -> bool {
+        shape[..] == [1.0]
     }
 
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {

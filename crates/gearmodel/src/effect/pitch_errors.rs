@@ -8,7 +8,9 @@
 
 use std::f64::consts::TAU;
 
-use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shape, Signature, StatedError, Station, Value};
+use super::{
+    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Rig, Shape, Signature, StatedError, Station, Value,
+};
 
 /// Pitch errors of the driver's teeth, flank by flank.
 pub(super) struct PitchErrors;
@@ -64,17 +66,27 @@ impl Effect for PitchErrors {
         Some(table(beta, teeth(rig)))
     }
 
-    fn sharp(&self) -> bool {
-        true
+    fn grain(&self) -> Grain {
+        Grain::Sharp
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
         let teeth = teeth(rig);
         let side = usize::from(at.sense < 0.0);
         let waves = teeth - 1;
+        let scale = (2.0 / teeth as f64).sqrt() / at.arm_mm;
         let mut add = |tooth: usize, share: f64| {
-            for (n, cell) in row[side * waves..(side + 1) * waves].iter_mut().enumerate() {
-                *cell += share * wave(n, tooth, teeth) / at.arm_mm;
+            // `wave` for all n, each order turned on from the one before.
+            let (sin, cos) = (TAU * tooth as f64 / teeth as f64).sin_cos();
+            let (mut s, mut c) = (share * scale * sin, share * scale * cos);
+            let mut orders = row[side * waves..(side + 1) * waves].chunks_exact_mut(2);
+            for order in &mut orders {
+                order[0] += c;
+                order[1] += s;
+                (s, c) = (s * cos + c * sin, c * cos - s * sin);
+            }
+            if let [last] = orders.into_remainder() {
+                *last += c * std::f64::consts::FRAC_1_SQRT_2;
             }
         };
         if shape.is_empty() {

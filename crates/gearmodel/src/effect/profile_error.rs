@@ -7,7 +7,7 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
+    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
     StatedError, Station,
 };
 
@@ -61,6 +61,10 @@ impl Effect for ProfileError {
 
     fn width(&self, _rig: &Rig, shape: &Shape) -> usize {
         if shape[..] == [A_FLANK] { 4 * ORDERS } else { 2 * ORDERS }
+    }
+
+    fn grain(&self) -> Grain {
+        Grain::Fine
     }
 
     fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {

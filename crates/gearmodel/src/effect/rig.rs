@@ -14,6 +14,9 @@ const ZONE_STEPS: usize = 720;
 const RATIO_STEPS: usize = 512;
 /// Orders of the ratio smaller than this part of the largest are left out.
 const LEAST_ORDER: f64 = 1e-9;
+/// Steps a tooth at which the mesh's wave is taken apart, and the part of it under which an order is left out.
+const MESH_STEPS_A_TOOTH: i32 = 16;
+const LEAST_MESH_ORDER: f64 = 1e-4;
 /// Halvings of an angle step until the end of a contact is known, to 0.002°.
 const HALVINGS: usize = 8;
 
@@ -30,6 +33,17 @@ pub struct Rig {
     pitch_mm: f64,
     /// Amplitudes of cos nθ1 and sin nθ1 in i21(θ1), n = 1, 2, …; empty where the ratio is constant.
     ratio_orders: Vec<[f64; 2]>,
+    mesh_orders: MeshOrders,
+}
+
+/// The mesh's wave e^{j2πu}, u the pitches rolled on the ccw flank, as orders of the driver's turn: on a pair whose radius varies the
+/// mesh frequency is modulated.
+#[derive(Clone, Debug, Default)]
+pub struct MeshOrders {
+    /// First order.
+    pub first: i32,
+    /// Complex amplitudes [re, im] of this and the next orders.
+    pub amplitudes: Vec<[f64; 2]>,
 }
 
 impl Rig {
@@ -39,7 +53,8 @@ impl Rig {
         let spans = spans(&model.pair);
         let pitch_mm = model.pair.pitch_mm().unwrap_or(f64::NAN);
         let ratio_orders = ratio_orders(&model.pair);
-        Self { model, lines, output_counts_per_rev, spans, pitch_mm, ratio_orders }
+        let mesh_orders = mesh_orders(&model.pair, pitch_mm);
+        Self { model, lines, output_counts_per_rev, spans, pitch_mm, ratio_orders, mesh_orders }
     }
 
     /// The pair.
@@ -58,6 +73,12 @@ impl Rig {
     #[must_use]
     pub fn ratio_orders(&self) -> &[[f64; 2]] {
         &self.ratio_orders
+    }
+
+    /// The mesh's wave as orders of the driver's turn; empty where there are no teeth.
+    #[must_use]
+    pub fn mesh_orders(&self) -> &MeshOrders {
+        &self.mesh_orders
     }
 
     /// k of an elliptic pair.
@@ -188,6 +209,36 @@ fn ratio_orders(pair: &GearPair) -> Vec<[f64; 2]> {
     let last = orders.iter().rposition(|order| size(order) > least).map_or(0, |n| n + 1);
     orders.truncate(last);
     orders
+}
+
+/// Orders of the driver's turn in e^{j2πu}: a discrete Fourier transform over the turn, about the order of the teeth.
+fn mesh_orders(pair: &GearPair, pitch_mm: f64) -> MeshOrders {
+    let teeth = pair.teeth().0 as i32;
+    if !pair.has_teeth() || teeth == 0 {
+        return MeshOrders::default();
+    }
+    let steps = MESH_STEPS_A_TOOTH * teeth;
+    let wave: Vec<(f64, f64)> = (0..steps)
+        .map(|n| (TAU * pair.arc_length_mm(TAU * f64::from(n) / f64::from(steps)) / pitch_mm).sin_cos())
+        .collect();
+    let amplitude = |order: i32| {
+        let (mut re, mut im) = (0.0, 0.0);
+        for (n, (sin, cos)) in (0_i32..).zip(&wave) {
+            let place = (i64::from(order) * i64::from(n)).rem_euclid(i64::from(steps));
+            let (s, c) = (TAU * place as f64 / f64::from(steps)).sin_cos();
+            // e^{j2πu} e^{−jnθ1}
+            re += cos * c + sin * s;
+            im += sin * c - cos * s;
+        }
+        [re / f64::from(steps), im / f64::from(steps)]
+    };
+    // The mesh never runs backwards, nor so much faster than in the mean that its orders would reach half of the steps.
+    let all: Vec<(i32, [f64; 2])> = (0..=3 * teeth).map(|order| (order, amplitude(order))).collect();
+    let counts = |(_, [re, im]): &(i32, [f64; 2])| re.hypot(*im) > LEAST_MESH_ORDER;
+    let (Some(low), Some(high)) = (all.iter().position(counts), all.iter().rposition(counts)) else {
+        return MeshOrders::default();
+    };
+    MeshOrders { first: all[low].0, amplitudes: all[low..=high].iter().map(|(_, amplitude)| *amplitude).collect() }
 }
 
 /// Contact of every driver tooth's flank, by sense; empty where there are no teeth.

@@ -42,7 +42,7 @@ impl Effect for Slip {
             .collect()
     }
 
-    fn evolves(&self) -> bool {
+    fn evolves(&self, _shape: &Shape) -> bool {
         true
     }
 

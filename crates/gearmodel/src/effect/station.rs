@@ -1,12 +1,14 @@
 //! Where and when a residual was seen: everything that an effect's trace may depend on.
 
-use crate::Direction;
+use super::Shaft;
 
 /// One place in a campaign.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Station {
     /// Driver angle θ1, rad.
     pub theta1_rad: f64,
+    /// Standard deviation of the driver angles of the samples that it stands for, rad.
+    pub spread_rad: f64,
     /// Driven angle, rad.
     pub theta2_rad: f64,
     /// Driving sense: +1 ccw, −1 cw.
@@ -31,8 +33,6 @@ pub struct Station {
     pub time_s: f64,
     /// Way of the driver since then in either sense, revolutions.
     pub way_rev: f64,
-    /// Way signed by the sense, revolutions, by load over a threshold is the effects' own affair: see `loads`.
-    pub net_rev: f64,
     /// Run's number.
     pub run: usize,
     /// Signed revolutions driven so far at each of the plan's loads.
@@ -54,20 +54,74 @@ pub struct Ledger {
 }
 
 impl Station {
-    /// The same a little further along the driver's turn, as far as the teeth see it: angle and pitches.
+    /// Angle of a shaft, rad.
     #[must_use]
-    pub fn moved(&self, step_rad: f64) -> Self {
-        Self {
-            theta1_rad: self.theta1_rad + step_rad,
-            pitches: self.pitches + step_rad * self.pitches_per_rad,
-            ..*self
+    pub fn angle_rad(&self, shaft: Shaft) -> f64 {
+        match shaft {
+            Shaft::Input => self.theta1_rad,
+            Shaft::Output => self.theta2_rad,
         }
     }
 
-    /// The driving sense.
+    /// Columns gain·sin nθ and gain·cos nθ over a shaft's angle.
+    pub fn wave(&self, shaft: Shaft, order: f64, gain: f64, row: &mut [f64]) {
+        let (sin, cos) = (order * self.angle_rad(shaft)).sin_cos();
+        row[0] = gain * sin;
+        row[1] = gain * cos;
+    }
+
+    /// TE of a reading error sin nθ and cos nθ of a shaft's encoder: the input encoder's is seen through the ratio, with the other
+    /// sign.
+    pub fn reading_error(&self, encoder: Shaft, order: f64, row: &mut [f64]) {
+        let gain = match encoder {
+            Shaft::Input => -self.ratio,
+            Shaft::Output => 1.0,
+        };
+        self.wave(encoder, order, gain, row);
+    }
+
+    /// Takes angles and all that follows from them from another station; condition and time stay.
+    pub fn take_angles_of(&mut self, other: &Self) {
+        *self = Self {
+            spread_rad: self.spread_rad,
+            load_nm: self.load_nm,
+            speed_rad_per_s: self.speed_rad_per_s,
+            time_s: self.time_s,
+            way_rev: self.way_rev,
+            run: self.run,
+            ledger: self.ledger,
+            ..*other
+        };
+    }
+
+    /// Moves it to a little further along the driver's turn than `from`, as far as the teeth see it: angle and pitches.
+    pub fn move_from(&mut self, from: &Self, step_rad: f64) {
+        self.theta1_rad = from.theta1_rad + step_rad;
+        self.pitches = from.pitches + step_rad * from.pitches_per_rad;
+    }
+}
+
+/// How fine the trace of an effect is against the stretches of angle over which samples are averaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grain {
+    /// As good as constant over them: taken at their middle.
+    Smooth,
+    /// Bent over them: taken on both sides of the middle, which gives the mean to the third order.
+    Fine,
+    /// Jumps: taken at many places.
+    Sharp,
+}
+
+impl Grain {
+    /// Where a trace is taken, in standard deviations of the samples' angles.
     #[must_use]
-    pub fn direction(&self) -> Direction {
-        if self.sense > 0.0 { Direction::Ccw } else { Direction::Cw }
+    pub fn places(self) -> &'static [f64] {
+        match self {
+            Self::Smooth => &[0.0],
+            Self::Fine => &[-1.0, 1.0],
+            // Middles of six equal parts of a box with this standard deviation, which is √12 wide.
+            Self::Sharp => &[-1.443_376, -0.866_025, -0.288_675, 0.288_675, 0.866_025, 1.443_376],
+        }
     }
 }
 

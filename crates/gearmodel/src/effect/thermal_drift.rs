@@ -39,7 +39,7 @@ impl Effect for ThermalDrift {
         [-0.6, -0.3, 0.3, 0.6].into_iter().map(|part| vec![shape[0] * (part * step).exp()]).collect()
     }
 
-    fn evolves(&self) -> bool {
+    fn evolves(&self, _shape: &Shape) -> bool {
         true
     }
 

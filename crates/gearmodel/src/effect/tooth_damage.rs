@@ -4,7 +4,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::{
-    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station, Value,
+    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station,
+    Value,
 };
 
 /// One damaged tooth flank.
@@ -53,6 +54,10 @@ impl Effect for ToothDamage {
 
     fn one_sided(&self) -> bool {
         true
+    }
+
+    fn grain(&self) -> Grain {
+        Grain::Fine
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {

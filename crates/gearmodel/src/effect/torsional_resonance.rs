@@ -1,8 +1,11 @@
-//! Something on the drive train is soft enough to ring. Three kinds; the shape is [kind, f, ζ].
+//! Something on the drive train is soft enough to ring. Three kinds; the shape is [kind, f, ζ, response].
 //!
-//! Kinds 0 and 1: an excitation once a turn (0) or at the mesh (1) of unknown amplitude a comes through amplified by
-//! H(ν) = 1/(1 − (ν/f)² + 2jζ ν/f) at its frequency ν. Its part beyond the quasi-static one is the trace:
-//! TE = Re[(H(ν) − 1)·a e^{jx}], x = θ1 or 2π u.
+//! Kinds 0 and 1: an excitation once a turn (0) or at the mesh (1) of unknown amplitude â comes through amplified. With D = 1 − x² +
+//! 2jζx, x = ν/f, a part of it at the frequency ν comes through with one of four responses, a fourth number of the shape:
+//! 0 whole 1/D (damped against the rig), 1 what that adds to the excitation, 1/D − 1, 2 carried (1 + 2jζx)/D (damped by what it hangs
+//! on), 3 what that adds, x²/D. Once a turn TE = Re[H(ν) â e^{jθ1}]. The mesh of a pair whose radius varies changes its frequency
+//! faster than a resonance follows, so each of its orders comes through with its own response:
+//! e^{j2πu} = Σ E_n e^{jnθ1}, TE = Re[â Σ H(nω) E_n e^{jnθ1}], ω the driver's speed with its sign.
 //!
 //! Kind 2: the output encoder hangs on a soft coupling, and the pair's own uneven motion excites it: ẍ + 2ζω0 ẋ + ω0² x = −q̈ for the
 //! disc's lead x, with q = f(θ1) and ω0 = 2πf. At the driver's speed ω, with the orders of the ratio i = Σ Re(c_n e^{jnθ1}), the steady motion is
@@ -12,13 +15,28 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
+    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
     StatedError, Station, stated,
 };
 
 /// What excites it, as a file states it, and the kind that it is.
 const EXCITED_BY: [&str; 3] = ["mesh", "turn", "encoder"];
 const KINDS: [f64; 3] = [MESH, TURN, ENCODER];
+/// Responses as a file states them, by number.
+const RESPONSES: [&str; 4] = ["whole", "whole less excitation", "carried", "carried less excitation"];
+
+/// Response at x = ν/f of either sign, [re, im].
+fn response(number: f64, x: f64, zeta: f64) -> [f64; 2] {
+    let (re, im) = (1.0 - x * x, 2.0 * zeta * x);
+    let size = re * re + im * im;
+    let over = |a: f64, b: f64| [(a * re + b * im) / size, (b * re - a * im) / size];
+    match number as u8 {
+        0 => over(1.0, 0.0),
+        1 => over(x * x, -im),
+        2 => over(1.0, im),
+        _ => over(x * x, 0.0),
+    }
+}
 
 /// Once a turn of the driver.
 const TURN: f64 = 0.0;
@@ -30,6 +48,12 @@ const ENCODER: f64 = 2.0;
 const ENCODER_ORDERS: [f64; 3] = [6.0, 15.0, 100.0];
 /// Damping ratio of the encoder's coupling tried first: far below the resonance it does not show.
 const ENCODER_ZETA: f64 = 0.05;
+/// Lowest and highest resonance tried, in parts of the excitation's highest frequency, and ratios of neighbours.
+const FREQUENCIES: [f64; 2] = [0.4, 3.3];
+const TURN_RATIO: f64 = 1.35;
+const MESH_RATIO: f64 = 1.07;
+/// Damping ratio tried first where the mesh rings it.
+const MESH_ZETA: f64 = 0.05;
 /// How far the amplitude of kind 2 may be from 1, as a factor of f.
 const CONSISTENT: f64 = 0.01;
 
@@ -70,15 +94,15 @@ impl Effect for TorsionalResonance {
         if *high < 1.2 * low {
             return Vec::new();
         }
-        let mut shapes = Vec::new();
-        for (kind, per_turn) in [(TURN, 1.0), (MESH, f64::from(rig.pair().teeth().0))] {
-            if per_turn == 0.0 {
-                continue;
-            }
-            for n in 0..8 {
-                let f_hz = per_turn * high / TAU * 0.4 * 1.35_f64.powi(n);
-                shapes.extend([0.02, 0.1].map(|zeta| vec![kind, f_hz, zeta]));
-            }
+        let mut shapes: Vec<Shape> = Vec::new();
+        let turn_hz = high / TAU;
+        for f_hz in frequencies(turn_hz, TURN_RATIO) {
+            shapes.extend([0.02, 0.1].map(|zeta| vec![TURN, f_hz, zeta, 0.0]));
+        }
+        // Where the mesh frequency sweeps over it, a resonance rings on in its own phase: the grid must be as fine as it is narrow.
+        let teeth = f64::from(rig.pair().teeth().0);
+        if teeth > 0.0 {
+            shapes.extend(frequencies(teeth * turn_hz, MESH_RATIO).map(|f_hz| vec![MESH, f_hz, MESH_ZETA, 0.0]));
         }
         if !rig.ratio_orders().is_empty() {
             shapes.extend(ENCODER_ORDERS.map(|order| vec![ENCODER, order * high / TAU, ENCODER_ZETA]));
@@ -87,15 +111,24 @@ impl Effect for TorsionalResonance {
     }
 
     fn neighbours(&self, shape: &Shape, step: f64) -> Vec<Shape> {
-        let [kind, f_hz, zeta] = shape[..] else { return Vec::new() };
+        let [kind, f_hz, zeta, ..] = shape[..] else { return Vec::new() };
+        let with = |f_hz: f64, zeta: f64| {
+            let mut near = shape.clone();
+            (near[1], near[2]) = (f_hz, zeta);
+            near
+        };
         let mut shapes = Vec::new();
         for higher in [-0.16, -0.08, 0.0, 0.08, 0.16] {
             for softer in [-0.8, 0.0, 0.8] {
                 if higher != 0.0 || softer != 0.0 {
                     let damping = (zeta * f64::exp(softer * step.sqrt())).clamp(0.005, 0.5);
-                    shapes.push(vec![kind, f_hz * f64::exp(higher * step), damping]);
+                    shapes.push(with(f_hz * f64::exp(higher * step), damping));
                 }
             }
+        }
+        if let Some(own) = shape.get(3) {
+            let others = (0..RESPONSES.len()).map(|number| number as f64).filter(|number| number != own);
+            shapes.extend(others.map(|number| vec![kind, f_hz, zeta, number]));
         }
         shapes
     }
@@ -117,30 +150,42 @@ impl Effect for TorsionalResonance {
         true
     }
 
+    fn grain(&self) -> Grain {
+        Grain::Fine
+    }
+
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
-        let [kind, f_hz, zeta] = shape[..] else { return };
+        let [kind, f_hz, zeta, ref rest @ ..] = shape[..] else { return };
         if kind == ENCODER {
             row[0] = encoder_lead_rad(rig, f_hz, zeta, at);
             return;
         }
-        let (phase_rad, frequency_hz) = if kind == MESH {
-            // The mesh frequency follows the local radius.
-            (TAU * at.pitches, at.pitches_per_rad * at.speed_rad_per_s.abs())
+        let number = rest.first().copied().unwrap_or(0.0);
+        let hz = at.speed_rad_per_s / TAU;
+        let (sin, cos) = at.theta1_rad.sin_cos();
+        let (re, im) = if kind == MESH {
+            let orders = rig.mesh_orders();
+            let (mut wave_sin, mut wave_cos) = (f64::from(orders.first) * at.theta1_rad).sin_cos();
+            let (mut re, mut im) = (0.0, 0.0);
+            for (order, [a, b]) in (orders.first..).zip(&orders.amplitudes) {
+                let [h, g] = response(number, f64::from(order) * hz / f_hz, zeta);
+                let (e_re, e_im) = (a * wave_cos - b * wave_sin, a * wave_sin + b * wave_cos);
+                re += h * e_re - g * e_im;
+                im += h * e_im + g * e_re;
+                (wave_cos, wave_sin) = (wave_cos * cos - wave_sin * sin, wave_sin * cos + wave_cos * sin);
+            }
+            // The cw flank stands half a pitch on.
+            (at.sense * re, at.sense * im)
         } else {
-            (at.theta1_rad, at.speed_rad_per_s.abs() / TAU)
+            let [h, g] = response(number, hz / f_hz, zeta);
+            (h * cos - g * sin, h * sin + g * cos)
         };
-        let x = frequency_hz / f_hz;
-        let (re, im) = (1.0 - x * x, 2.0 * zeta * x);
-        let size = re * re + im * im;
-        // H − 1, and the sense in which the phase runs.
-        let (gain, turn) = (re / size - 1.0, -im / size * at.sense);
-        let (sin, cos) = phase_rad.sin_cos();
-        row[0] = gain * sin + turn * cos;
-        row[1] = gain * cos - turn * sin;
+        row[0] = im;
+        row[1] = re;
     }
 
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
-        let [kind, f_hz, zeta] = shape[..] else { return Vec::new() };
+        let [kind, f_hz, zeta, ..] = shape[..] else { return Vec::new() };
         if kind == ENCODER {
             // β = (f_shape/f)², so f = f_shape/√β and df = f dβ/(2β).
             let amplitude = found.beta[0].max(f64::MIN_POSITIVE);
@@ -154,14 +199,18 @@ impl Effect for TorsionalResonance {
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {
-        &["f_hz", "zeta", "excitation_rad", "phase_rad", "excited_by"]
+        &["f_hz", "zeta", "excitation_rad", "phase_rad", "excited_by", "response"]
     }
 
     fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let kind = KINDS[given.word("excited_by", &EXCITED_BY, true)?];
-        let shape = vec![kind, given.number_in("f_hz", 1e-6, 1e9)?, given.number_in("zeta", 1e-6, 10.0)?];
-        // The encoder's own swing has no amplitude but what the ratio gives it.
-        Ok((shape, if kind == ENCODER { vec![1.0] } else { given.polar("excitation_rad")? }))
+        let mut shape = vec![kind, given.number_in("f_hz", 1e-6, 1e9)?, given.number_in("zeta", 1e-6, 10.0)?];
+        if kind == ENCODER {
+            // Its own swing has no amplitude but what the ratio gives it.
+            return Ok((shape, vec![1.0]));
+        }
+        shape.push(given.word("response", &RESPONSES, true)? as f64);
+        Ok((shape, given.polar("excitation_rad")?))
     }
 
     fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
@@ -169,8 +218,17 @@ impl Effect for TorsionalResonance {
         let kind = KINDS.iter().position(|kind| shape.first() == Some(kind)).unwrap_or(0);
         let word = EXCITED_BY[kind];
         stated.insert("excited_by".to_owned(), Stated::Text(word.to_owned()));
+        if let Some(number) = shape.get(3) {
+            stated.insert("response".to_owned(), Stated::Text(RESPONSES[*number as usize].to_owned()));
+        }
         stated
     }
+}
+
+/// Resonances tried about the excitation's highest frequency.
+fn frequencies(highest_hz: f64, ratio: f64) -> impl Iterator<Item = f64> {
+    let count = ((FREQUENCIES[1] / FREQUENCIES[0]).ln() / ratio.ln()).ceil() as i32;
+    (0..=count).map(move |n| FREQUENCIES[0] * highest_hz * ratio.powi(n))
 }
 
 /// Steady lead of the output encoder's disc over its shaft, rad (kind 2).

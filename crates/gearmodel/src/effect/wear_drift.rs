@@ -22,7 +22,7 @@ impl Effect for WearDrift {
         true
     }
 
-    fn evolves(&self) -> bool {
+    fn evolves(&self, _shape: &Shape) -> bool {
         true
     }
 

@@ -93,7 +93,7 @@ pub fn twins(
     whitened: &Whitened,
     attribution: &Attribution,
     effect: usize,
-    swapped_score: &dyn Fn(usize) -> Option<f64>,
+    swapped_score: &mut dyn FnMut(usize) -> Option<f64>,
     best_score: f64,
 ) -> Vec<(usize, f64)> {
     let Some(own) = attribution.block[effect] else { return Vec::new() };

@@ -6,16 +6,17 @@ use super::attribute::{self, Attribution, twins};
 use super::diagnosis::{Confusability, Diagnosis, EffectFinding, Group, Unknown, UnknownLocation, Verdict};
 use super::events::Tone;
 use super::grid::Grid;
+use super::knocks::Knocks;
 use super::line_phase::{LineError, LinePhase};
 use super::noise::{FIRST_RUN_RATIO, Noise, Whitened};
 use super::nominal::Nominal;
 use super::pool::{Cause, Pool};
 use super::predict::{Found, FoundEffect};
 use super::reduce::{ReducedRun, Reducer, Sample};
-use super::search::{Model, Search};
+use super::search::{Allowed, Model, Search};
 use super::unknown::Pattern;
-use super::{events, evidence, interpolation, locate, next, shrink};
-use crate::effect::{Accumulates, Estimate, LIBRARY, Rig, by_name};
+use super::{events, evidence, interpolation, knocks, locate, next, shrink};
+use crate::effect::{Accumulates, Estimate, INTERPOLATION, LIBRARY, Rig, by_name};
 use crate::recording::Recording;
 use crate::{Direction, NominalModel};
 
@@ -31,6 +32,10 @@ const NEAR_NATS: f64 = 30.0;
 const LARGE: f64 = 0.12;
 /// Steps in which shapes are moved, in parts of their grid's.
 const SHARPENING_STEPS: [f64; 6] = [1.0, 0.6, 0.3, 0.15, 0.07, 0.03];
+/// First step of a wandering wave's order when it is sharpened, in parts of what the angle covered tells apart.
+const ORDER_STEP: f64 = 0.4;
+/// What a moved shape must gain, nats: a fifth of its standard deviation.
+const SHARPER_NATS: f64 = 0.02;
 /// Rounds of: search, look for events, sharpen shapes, estimate the noise anew.
 const ROUNDS: usize = 3;
 /// Log Bayes factor from which a sub-divisional error is taken off.
@@ -184,21 +189,25 @@ pub fn diagnose_runs(
         return Err(GapError::TooShort { recordings, points, needed: FEWEST_POINTS });
     }
     let found_lines = take_off_lines(&mut runs, lines.as_ref(), options);
-    let tones = events::take_off_tones(nominal.rig(), &mut runs);
-    let mut engine = Engine::new(nominal.rig(), &runs, tones, options);
+    let mut grid = Grid::new(nominal.rig(), &runs);
+    let knocks = knocks::take_off(&grid, &mut runs);
+    if knocks.is_some() {
+        grid = Grid::new(nominal.rig(), &runs);
+    }
+    let (tones, grid) = events::take_off_tones(nominal.rig(), &mut runs, grid);
+    let mut engine = Engine::new(nominal.rig(), grid, Aside { tones, knocks }, options);
     engine.solve();
     engine.report(&found_lines).ok_or(GapError::Singular)
 }
 
 /// Finds sub-divisional errors and takes them off the points, so that they are no noise for the rest.
 fn take_off_lines(runs: &mut [ReducedRun], lines: Option<&LinePhase>, options: &Options) -> Vec<LineError> {
-    let names = ["encoder1_interpolation", "encoder2_interpolation"];
     let mut found: Vec<LineError> = Vec::new();
     if let Some(lines) = lines {
         // The strongest first, and each judged on what the others leave.
         let mut left = lines.clone();
         let open: Vec<(usize, usize)> = (0..2)
-            .filter(|encoder| !options.exclude.iter().any(|name| name == names[*encoder]))
+            .filter(|encoder| !options.exclude.iter().any(|name| name == INTERPOLATION[*encoder]))
             .flat_map(|encoder| [1, 2].map(|order| (encoder, order)))
             .collect();
         while let Some(error) = open
@@ -257,10 +266,28 @@ fn join(mut runs: Vec<ReducedRun>) -> Vec<ReducedRun> {
     joined
 }
 
+/// What was taken off the points before anything was fitted.
+struct Aside {
+    tones: Vec<Tone>,
+    knocks: Option<Knocks>,
+}
+
+impl Aside {
+    /// Its mean square, rad².
+    fn mean_square_rad2(&self) -> f64 {
+        let tones: f64 = self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum();
+        tones + self.knocks.map_or(0.0, |knocks| knocks.mean_square_rad2)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.tones.is_empty() && self.knocks.is_none()
+    }
+}
+
 /// The state of a diagnosis.
 struct Engine<'a> {
     rig: &'a Rig,
-    tones: Vec<Tone>,
+    aside: Aside,
     grid: Grid,
     pool: Pool,
     options: &'a Options,
@@ -270,13 +297,10 @@ struct Engine<'a> {
     models: Vec<Model>,
     /// The larger blocks with their shapes moved to where they fit best: a start for the next search.
     large: Option<Vec<usize>>,
-    /// Steps that were found and taken into the pool.
-    events: Vec<Pattern>,
 }
 
 impl<'a> Engine<'a> {
-    fn new(rig: &'a Rig, runs: &[ReducedRun], tones: Vec<Tone>, options: &'a Options) -> Self {
-        let grid = Grid::new(rig, runs);
+    fn new(rig: &'a Rig, grid: Grid, aside: Aside, options: &'a Options) -> Self {
         let mut pool = Pool::new(&grid);
         let mut causes = Vec::new();
         for (number, effect) in LIBRARY.iter().copied().enumerate() {
@@ -292,19 +316,7 @@ impl<'a> Engine<'a> {
         pool.add(&grid, rig, causes);
         let noise = Noise::estimate(&grid, &pool, &[]);
         let whitened = Whitened { gram: nalgebra::DMatrix::zeros(0, 0), log_det: 0.0 };
-        Self {
-            rig,
-            tones,
-            grid,
-            pool,
-            options,
-            noise,
-            whitened,
-            best: None,
-            models: Vec::new(),
-            large: None,
-            events: Vec::new(),
-        }
+        Self { rig, aside, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None }
     }
 
     /// Search, look for events, sharpen, estimate the noise anew, until nothing changes.
@@ -340,7 +352,7 @@ impl<'a> Engine<'a> {
         let mut search = Search::new(&self.pool, &self.whitened, &self.options.known);
         let mut best = search.run();
         for set in starts {
-            if let Some(other) = search.climb(set, true)
+            if let Some(other) = search.climb(set, Allowed::All)
                 && best.as_ref().is_none_or(|b| other.score > b.score)
             {
                 best = Some(other);
@@ -364,19 +376,19 @@ impl<'a> Engine<'a> {
         let mut columns = vec![evidence::RESIDUAL];
         columns.extend(&fit.columns);
         let mut chosen = (f64::NEG_INFINITY, noise.run_ratio);
+        let within = noise.within_runs(&self.grid, pool, Some(&columns));
         for level in RUN_RATIOS {
             for waves in RUN_RATIOS {
-                let mut noise = noise.clone();
-                noise.run_ratio = [level, waves];
-                let whitened = noise.whiten_runs(&self.grid, pool, Some(&columns));
-                let log_prior: f64 = [level, waves]
+                let ratio = [level, waves];
+                let whitened = within.between_runs(ratio);
+                let log_prior: f64 = ratio
                     .iter()
                     .zip(FIRST_RUN_RATIO)
                     .map(|(ratio, usual)| -0.5 * ((ratio / usual).ln() / RUN_RATIO_SPREAD).powi(2))
                     .sum();
                 let score = evidence::at_scales(pool, &whitened, fit) + log_prior;
                 if score > chosen.0 {
-                    chosen = (score, noise.run_ratio);
+                    chosen = (score, ratio);
                 }
             }
         }
@@ -388,12 +400,12 @@ impl<'a> Engine<'a> {
     /// small.
     fn sharpen(&mut self) -> bool {
         let Some(best) = &self.best else { return false };
-        let largest = (0..best.fit.set.len()).map(|n| self.rms_rad(&best.fit, n)).fold(0.0, f64::max);
+        let largest = (0..best.fit.set.len()).map(|n| best.fit.rms_rad(&self.pool, n)).fold(0.0, f64::max);
         let large: Vec<usize> = (0..best.fit.set.len())
-            .filter(|n| self.rms_rad(&best.fit, *n) > LARGE * largest)
+            .filter(|n| best.fit.rms_rad(&self.pool, *n) > LARGE * largest)
             .map(|n| best.fit.set[n])
             .collect();
-        let mut few = Pool::new(&self.grid);
+        let mut few = self.pool.beside(&self.grid);
         let causes: Vec<Cause> = large.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
         let mut set = few.add(&self.grid, self.rig, causes);
         if set.len() < large.len() {
@@ -416,42 +428,41 @@ impl<'a> Engine<'a> {
             let fresh =
                 shaped.iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(cause, _)| cause.clone()).collect();
             let mut added = self.pool.add(&self.grid, self.rig, fresh).into_iter();
-            let mut set: Vec<usize> = known.into_iter().filter_map(|k| k.or_else(|| added.next())).collect();
-            set.sort_unstable();
-            self.large = Some(set);
+            self.large = Some(known.into_iter().filter_map(|k| k.or_else(|| added.next())).collect());
         }
         changed
     }
 
-    /// Block of the pool with the same effect and shape.
+    /// Block of the pool with the same cause.
     fn block_of(&self, cause: &Cause) -> Option<usize> {
-        let Cause::Effect { number, shape, .. } = cause else {
-            return self.pool.blocks.iter().position(|b| match (&b.cause, cause) {
-                (Cause::Unknown(a), Cause::Unknown(b)) => a == b,
-                _ => false,
-            });
-        };
-        self.pool
-            .blocks
-            .iter()
-            .position(|b| matches!(&b.cause, Cause::Effect { number: m, shape: s, .. } if m == number && s == shape))
+        self.pool.blocks.iter().position(|block| match (&block.cause, cause) {
+            (Cause::Unknown(a), Cause::Unknown(b)) => a == b,
+            (Cause::Effect { number: m, shape: a, .. }, Cause::Effect { number: n, shape: b, .. }) => m == n && a == b,
+            _ => false,
+        })
     }
 
     /// Tries the shapes about that of block `n` of a set, and puts the best in its place.
     fn sharpen_block(&self, few: &mut Pool, set: &mut [usize], n: usize, step: f64) -> bool {
-        let Cause::Effect { effect, number, shape, cost_nats } = few.blocks[set[n]].cause.clone() else { return false };
         let whitened = self.noise.whiten(&self.grid, few);
         let Some(now) = evidence::fit(few, &whitened, set, &[]) else { return false };
-        let mut shapes = effect.neighbours(&shape, step);
-        shapes.extend(effect.refine(self.rig, &shape, &amplitudes_of(few, &now, n).beta));
-        let fresh: Vec<Cause> =
-            shapes.into_iter().map(|shape| Cause::Effect { effect, number, shape, cost_nats }).collect();
+        let fresh: Vec<Cause> = match few.blocks[set[n]].cause.clone() {
+            Cause::Effect { effect, number, shape, cost_nats } => {
+                let refined = effect.refine(self.rig, &shape, &amplitudes_of(few, &now, n).beta);
+                let shapes = effect.neighbours(&shape, step).into_iter().chain(refined);
+                shapes.map(|shape| Cause::Effect { effect, number, shape, cost_nats }).collect()
+            }
+            Cause::Unknown(pattern) => {
+                let nearer = pattern.nearer(step * ORDER_STEP / self.grid.span_rev().max(1.0));
+                nearer.into_iter().map(Cause::Unknown).collect()
+            }
+        };
         if fresh.is_empty() {
             return false;
         }
         let tried = few.add(&self.grid, self.rig, fresh);
         let whitened = self.noise.whiten(&self.grid, few);
-        let mut winner = (now.log_evidence, set[n]);
+        let mut winner = (now.log_evidence + SHARPER_NATS, set[n]);
         for block in &tried {
             let mut other = set.to_vec();
             other[n] = *block;
@@ -462,7 +473,7 @@ impl<'a> Engine<'a> {
             }
         }
         // Only the winner stays.
-        match few.keep_of(&tried, winner.1) {
+        match few.keep_of(&self.grid, &tried, winner.1) {
             Some(kept) => {
                 set[n] = kept;
                 true
@@ -490,37 +501,22 @@ impl<'a> Engine<'a> {
             .unwrap_or_default()
     }
 
-    /// RMS of the trace of block `n` of a fit, rad.
-    fn rms_rad(&self, fit: &evidence::Fit, n: usize) -> f64 {
-        let place = fit.place(&self.pool, n);
-        fit.mean.rows(place.start, place.len()).norm()
-    }
-
     fn look_for_events(&mut self) -> bool {
         let amplitudes = self.best.as_ref().map(|m| m.fit.amplitudes()).unwrap_or_default();
         let steady = self.steady_amplitudes();
         let found = events::find(&self.grid, &self.pool, &self.noise, &amplitudes, &steady);
         let mut causes = Vec::new();
-        for pattern in found.patterns {
-            if !self.events.contains(&pattern) {
-                self.events.push(pattern.clone());
-                causes.push(Cause::Unknown(pattern));
-            }
-        }
+        causes.extend(found.patterns.into_iter().map(Cause::Unknown));
         let allowed = !self.options.exclude.iter().any(|name| name == "count_loss");
         let count_loss = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.name() == "count_loss");
         if let Some((number, effect)) = count_loss.filter(|_| allowed) {
-            for times_s in found.steps {
-                let known = self.pool.blocks.iter().any(
-                    |b| matches!(&b.cause, Cause::Effect { number: m, shape: s, .. } if *m == number && *s == times_s),
-                );
-                if !known {
-                    let [any, each] = events::STEPS_COST_NATS;
-                    let cost_nats = any + each * times_s.len() as f64;
-                    causes.push(Cause::Effect { effect, number, shape: times_s, cost_nats });
-                }
-            }
+            causes.extend(found.steps.into_iter().map(|times_s| {
+                let [any, each] = events::STEPS_COST_NATS;
+                let cost_nats = any + each * times_s.len() as f64;
+                Cause::Effect { effect, number, shape: times_s, cost_nats }
+            }));
         }
+        causes.retain(|cause| self.block_of(cause).is_none());
         let changed = !causes.is_empty();
         for block in self.pool.add(&self.grid, self.rig, causes) {
             self.weigh_event(block);
@@ -531,13 +527,8 @@ impl<'a> Engine<'a> {
     /// Looks for waves over the driver's angle that do not close with its turn, in a pool of its own, and takes the best into the
     /// pool where it is worth it.
     fn look_for_wandering_waves(&mut self) -> bool {
-        let (low, high) = self
-            .grid
-            .places
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), at| (l.min(at.theta1_rad), h.max(at.theta1_rad)));
         let mut step = 1.0;
-        let mut patterns = Pattern::wandering((high - low) / std::f64::consts::TAU);
+        let mut patterns = Pattern::wandering(self.grid.span_rev());
         if let [Pattern::Order { order: a, .. }, Pattern::Order { order: b, .. }, ..] = &patterns[..] {
             step = b - a;
         }
@@ -545,7 +536,7 @@ impl<'a> Engine<'a> {
             self.best.iter().flat_map(|m| &m.fit.set).map(|b| self.pool.blocks[*b].cause.clone()).collect();
         let mut best: Option<(Pattern, f64)> = None;
         for _ in 0..3 {
-            let mut few = Pool::new(&self.grid);
+            let mut few = self.pool.beside(&self.grid);
             let set = few.add(&self.grid, self.rig, found.clone());
             let tried = few.add(&self.grid, self.rig, patterns.iter().cloned().map(Cause::Unknown).collect());
             let whitened = self.noise.whiten(&self.grid, &few);
@@ -566,7 +557,6 @@ impl<'a> Engine<'a> {
         for block in &added {
             self.weigh_event(*block);
         }
-        self.whitened = self.noise.whiten(&self.grid, &self.pool);
         !added.is_empty()
     }
 
@@ -575,11 +565,10 @@ impl<'a> Engine<'a> {
     fn weigh_event(&mut self, block: usize) {
         let mut set = self.steady_set();
         set.push(block);
-        set.sort_unstable();
         let before = self.best.as_ref().map_or(f64::NEG_INFINITY, |m| m.score);
         // The set alone first, in a pool of its own: most events that are none fail here.
         let causes: Vec<Cause> = set.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
-        let mut few = Pool::new(&self.grid);
+        let mut few = self.pool.beside(&self.grid);
         let own = few.add(&self.grid, self.rig, causes);
         let whitened = self.noise.whiten(&self.grid, &few);
         let Some(fit) = evidence::fit(&few, &whitened, &own, &[]) else { return };
@@ -591,7 +580,7 @@ impl<'a> Engine<'a> {
             return;
         }
         let whitened = noise.whiten(&self.grid, &self.pool);
-        let with_event = Search::new(&self.pool, &whitened, &self.options.known).climb(set, true);
+        let with_event = Search::new(&self.pool, &whitened, &self.options.known).climb(set, Allowed::All);
         if let Some(model) = with_event.filter(|model| model.score > before) {
             self.best = Some(model);
             self.noise = noise;

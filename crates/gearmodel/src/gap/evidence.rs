@@ -13,7 +13,7 @@ use super::pool::{Block, Pool};
 const SCALES: usize = 11;
 const SMALLEST_SCALE_RAD: f64 = 1e-6;
 /// Blocks wider than this are scanned on a coarser grid of scales: 2, 8, 32, 128 µrad.
-const WIDE: usize = 16;
+pub(super) const WIDE: usize = 16;
 const WIDE_SCALES: i32 = 4;
 /// What the freedom of a scale costs: as on the grid, a third of whose points fit.
 const SCALE_COST: f64 = 1.3;
@@ -52,6 +52,13 @@ impl Fit {
     pub fn place(&self, pool: &Pool, n: usize) -> std::ops::Range<usize> {
         let first = 1 + self.set[..n].iter().map(|b| pool.blocks[*b].width()).sum::<usize>();
         first..first + pool.blocks[self.set[n]].width()
+    }
+
+    /// RMS of the trace of block `n` of the set, rad.
+    #[must_use]
+    pub fn rms_rad(&self, pool: &Pool, n: usize) -> f64 {
+        let place = self.place(pool, n);
+        self.mean.rows(place.start, place.len()).norm()
     }
 }
 
@@ -96,6 +103,22 @@ fn solve(g: &DMatrix<f64>, b: &DVector<f64>, variances: &[f64]) -> Option<Solved
     Some(Solved { cholesky, mean, log_evidence })
 }
 
+/// L⁻¹ of A = LLᵀ: A⁻¹ is its Gram matrix. Half the work of solving for the identity, most of which is zeros.
+fn lower_inverse(cholesky: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
+    let l = cholesky.l_dirty();
+    let n = l.nrows();
+    let mut inverse = DMatrix::zeros(n, n);
+    for (j, mut column) in inverse.column_iter_mut().enumerate() {
+        column[j] = 1.0;
+        for k in j..n {
+            let value = column[k] / l[(k, k)];
+            column[k] = value;
+            column.rows_mut(k + 1, n - k - 1).axpy(-value, &l.column(k).rows(k + 1, n - k - 1), 1.0);
+        }
+    }
+    inverse
+}
+
 /// Fits a set, its scales moved to where the evidence is largest. `None` where the columns cannot be told apart at all.
 pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -> Option<Fit> {
     let blocks = &pool.blocks;
@@ -104,14 +127,14 @@ pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -
     let mut scales_rad: Vec<f64> = (0..set.len()).map(|n| start_rad.get(n).copied().unwrap_or(3e-5)).collect();
     let mut solved = solve(&g, &b, &prior(blocks, set, &scales_rad))?;
     for _ in 0..8 {
-        let covariance = solved.cholesky.inverse();
+        let half = lower_inverse(&solved.cholesky);
         let mut first = 1;
         let mut moved = 0.0_f64;
         for (scale, block) in scales_rad.iter_mut().zip(set) {
             let width = blocks[*block].width();
             // s² is what the amplitudes are expected to sum up to: |m|² + trace of their covariance.
             let square: f64 =
-                (first..first + width).map(|n| solved.mean[n] * solved.mean[n] + covariance[(n, n)]).sum();
+                (first..first + width).map(|n| solved.mean[n] * solved.mean[n] + half.column(n).norm_squared()).sum();
             let next = square.sqrt().clamp(0.3e-6, 1e-1);
             moved = moved.max((next / *scale).ln().abs());
             *scale = next;
@@ -122,7 +145,8 @@ pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -
             break;
         }
     }
-    let covariance = solved.cholesky.inverse();
+    let half = lower_inverse(&solved.cholesky);
+    let covariance = half.transpose() * half;
     let cost: f64 = set.iter().map(|block| SCALE_COST.min(0.5 + 2.0 / blocks[*block].width() as f64).max(0.3)).sum();
     let signs: f64 = set
         .iter()

@@ -70,6 +70,23 @@ struct Sum {
     rho2: f64,
     load: f64,
     way: f64,
+    /// Driver's way from the bin's middle, and its square over the samples.
+    off: f64,
+    off2: f64,
+}
+
+impl Sum {
+    /// Mean way of the samples from the bin's middle, rad, and its variance, rad².
+    fn spread(&self) -> (f64, f64) {
+        let mean = self.off / self.weight;
+        (mean, (self.off2 / self.weight - mean * mean).max(0.0))
+    }
+
+    fn add_spread(&mut self, weight: f64, off: f64, variance: f64) {
+        self.weight += weight;
+        self.off += weight * off;
+        self.off2 += weight * (off * off + variance);
+    }
 }
 
 impl Grid {
@@ -142,6 +159,16 @@ impl Grid {
         grid
     }
 
+    /// Turns between the least and the largest angle of the driver.
+    #[must_use]
+    pub fn span_rev(&self) -> f64 {
+        let (low, high) = self
+            .places
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), at| (l.min(at.theta1_rad), h.max(at.theta1_rad)));
+        (high - low) / TAU
+    }
+
     fn add_run(&mut self, rig: &Rig, run: &ReducedRun, number: usize, frame: &RunFrame, ledger: &mut Ledger) {
         let index = self.directions.len();
         self.directions.push(run.direction);
@@ -164,6 +191,7 @@ impl Grid {
             let way_rev = (point.theta1_rad - origin_rad).abs() / TAU;
             let turn = (way_rev as usize).min(frame.turns - 1);
             let bin = (((way_rev - turn as f64).clamp(0.0, 1.0) * bins as f64) as usize).min(bins - 1);
+            let turn_rev = turn as f64;
             let turn = turn / frame.merge;
             let key = turn * bins + bin;
             keys.push(key);
@@ -171,7 +199,8 @@ impl Grid {
             // Means of the first turn's angles stand for all turns of a merged revolution.
             let turns_away = ((point.theta1_rad - origin_rad) / TAU).trunc() * f64::from(u8::from(frame.merge > 1));
             let sum = &mut sums[key];
-            sum.weight += w;
+            let middle_rev = turn_rev + (bin as f64 + 0.5) / bins as f64;
+            sum.add_spread(w, (way_rev - middle_rev) * TAU, point.spread_rad2);
             sum.time += w * (point.time_s - frame.start_s);
             sum.theta1 += w * (point.theta1_rad - TAU * turns_away);
             sum.theta2 += w * (point.theta2_rad - TAU * turns_away * rig.pair().closure());
@@ -188,6 +217,9 @@ impl Grid {
         let steady = frame.closes && steady_load(&run.points);
         let mut place_of_key = vec![usize::MAX; sums.len()];
         let mut cell_of_bin = vec![usize::MAX; bins];
+        let first_cell = self.cells.len();
+        // Way of a cell's first station from the bin's middle, and the ways of all of its places.
+        let mut cell_sums: Vec<(f64, Sum)> = Vec::new();
         for revolution in 0..revolutions {
             let first = self.places.len();
             for (bin, cell) in cell_of_bin.iter_mut().enumerate() {
@@ -203,7 +235,8 @@ impl Grid {
                 station.way_rev = sum.way / w;
                 station.speed_rad_per_s = speed_sums[key] / w;
                 station.run = index;
-                station.net_rev = books[key].signed_rev.iter().sum::<f64>() / w;
+                let (off_rad, variance_rad2) = sum.spread();
+                station.spread_rad = variance_rad2.sqrt();
                 station.ledger = Ledger {
                     load_nm: ledger.load_nm,
                     signed_rev: books[key].signed_rev.map(|x| x / w),
@@ -213,7 +246,9 @@ impl Grid {
                     *cell = self.cells.len();
                     self.cells.push(station);
                     self.part_of_cell.push((bin as f64 + 0.5) / bins as f64);
+                    cell_sums.push((off_rad, Sum::default()));
                 }
+                cell_sums[*cell - first_cell].1.add_spread(w, off_rad, variance_rad2);
                 place_of_key[key] = self.places.len();
                 self.places.push(station);
                 self.cell_of.push(*cell);
@@ -226,6 +261,14 @@ impl Grid {
                 let coverage = places.len() as f64 / bins as f64;
                 self.revolutions.push(Revolution { run: index, places, coverage });
             }
+        }
+        // A cell stands for its places of all revolutions: where their samples lie in the mean, and as far about it as they do.
+        for (cell, (first_rad, sum)) in self.cells[first_cell..].iter_mut().zip(cell_sums) {
+            let (mean_rad, variance_rad2) = sum.spread();
+            let step_rad = run.direction.sign() * (mean_rad - first_rad);
+            let (theta1_rad, theta2_rad) = (cell.theta1_rad + step_rad, cell.theta2_rad + cell.ratio * step_rad);
+            cell.take_angles_of(&rig.station(theta1_rad, theta2_rad, run.direction));
+            cell.spread_rad = variance_rad2.sqrt();
         }
         self.place_of_point[number] = keys.into_iter().map(|key| place_of_key[key]).collect();
     }
@@ -269,7 +312,8 @@ fn levels(values: impl Iterator<Item = f64>) -> Vec<f64> {
     found.into_iter().map(|(mean, _)| mean).collect()
 }
 
-fn nearest(levels: &[f64], value: f64) -> usize {
+/// Place of the level nearest to a value; 0 where there is none.
+pub(super) fn nearest(levels: &[f64], value: f64) -> usize {
     (0..levels.len()).min_by(|a, b| (levels[*a] - value).abs().total_cmp(&(levels[*b] - value).abs())).unwrap_or(0)
 }
 

@@ -7,12 +7,11 @@ use serde_json::json;
 
 use super::diagnosis::{Curve, Location, Slice};
 use super::evidence::Fit;
-use super::grid::Grid;
+use super::grid::{Grid, nearest};
 use super::line_phase::LineError;
 use super::noise::Noise;
 use super::pool::{Cause, Pool};
-use super::predict::FoundEffect;
-use crate::effect::{Accumulates, Carrier, LIBRARY, Parity, Rig, Shaft, Signature, Station};
+use crate::effect::{Accumulates, Carrier, INTERPOLATION, Parity, Rig, Signature, Station, by_name};
 
 /// Sectors of a turn.
 const SECTORS: usize = 36;
@@ -31,7 +30,6 @@ pub(super) struct Inputs<'a> {
     pub(super) noise: &'a Noise,
     pub(super) best: &'a Fit,
     pub(super) lines: &'a [LineError],
-    pub(super) leading: Option<&'a FoundEffect>,
 }
 
 /// The localisation of the residual before anything is added.
@@ -86,15 +84,11 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
             })
             .collect(),
         direction: by(&|at| Some(usize::from(at.sense < 0.0)), &[json!("ccw"), json!("cw")]),
-        load: by(&|at| nearest(&grid.plan.loads_nm, at.load_nm), &loads),
-        speed: by(&|at| nearest(&grid.plan.speeds_rad_per_s, at.speed_rad_per_s.abs()), &speeds),
+        load: by(&|at| Some(nearest(&grid.plan.loads_nm, at.load_nm)), &loads),
+        speed: by(&|at| Some(nearest(&grid.plan.speeds_rad_per_s, at.speed_rad_per_s.abs())), &speeds),
         revolution: by(&|at| Some(at.way_rev as usize), &(0..revolutions).map(|n| json!(n)).collect::<Vec<_>>()),
         time: by(&|at| Some(time(at)), &times),
     }
-}
-
-fn nearest(levels: &[f64], value: f64) -> Option<usize> {
-    (0..levels.len()).min_by(|a, b| (levels[*a] - value).abs().total_cmp(&(levels[*b] - value).abs()))
 }
 
 /// RMS of the residual by a key, beside the floor at the same number of samples a place.
@@ -140,14 +134,13 @@ fn amplitude(grid: &Grid, rest: &[f64], phase: &dyn Fn(&Station) -> f64) -> f64 
     (seen.iter().sum::<f64>() / seen.len().max(1) as f64).sqrt()
 }
 
-/// The signature: the leading effect's own row where an effect was found, freed of what the plan cannot tell; else that of the
-/// strongest unknown pattern; else that of nothing.
+/// The signature: the row of the largest effect or unknown pattern in the best model, freed of what the plan cannot tell; that of
+/// nothing where there is none.
 fn signature(inputs: &Inputs<'_>) -> Signature {
-    let Inputs { rig, grid, pool, best, leading, lines, .. } = inputs;
+    let Inputs { rig, grid, pool, best, lines, .. } = inputs;
     let mut largest: Option<(f64, Signature)> = None;
     for (n, b) in best.set.iter().enumerate() {
-        let place = best.place(pool, n);
-        let size = best.mean.rows(place.start, place.len()).norm_squared();
+        let size = best.rms_rad(pool, n).powi(2);
         let row = match &pool.blocks[*b].cause {
             Cause::Effect { effect, shape, .. } => effect.signature_of(rig, shape),
             Cause::Unknown(pattern) => pattern.signature(),
@@ -158,18 +151,13 @@ fn signature(inputs: &Inputs<'_>) -> Signature {
     }
     for line in *lines {
         let size = line.explained_rad2 / grid.samples;
-        let effect =
-            LIBRARY.iter().find(|e| e.name() == ["encoder1_interpolation", "encoder2_interpolation"][line.encoder]);
-        if let Some(effect) = effect
+        if let Some(effect) = by_name(INTERPOLATION[line.encoder])
             && largest.as_ref().is_none_or(|(s, _)| size > *s)
         {
             largest = Some((size, effect.signature()));
         }
     }
-    let mut row = largest
-        .map(|(_, row)| row)
-        .or_else(|| leading.map(|found| found.effect.signature_of(rig, &found.shape)))
-        .unwrap_or_else(|| Signature::steady(Carrier::None, Parity::Even));
+    let mut row = largest.map_or_else(|| Signature::steady(Carrier::None, Parity::Even), |(_, row)| row);
     let plan = &grid.plan;
     if plan.loads_nm.len() < 2 {
         row.load_exponent = None;
@@ -180,7 +168,6 @@ fn signature(inputs: &Inputs<'_>) -> Signature {
     if plan.revolutions < 2.0 && row.accumulates != Accumulates::PerTime {
         row.accumulates = Accumulates::No;
     }
-    debug_assert!(Shaft::Input != Shaft::Output);
     row
 }
 

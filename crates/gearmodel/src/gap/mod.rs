@@ -4,10 +4,10 @@
 //! |---|---|---|
 //! | residual against the nominal model, by stretches | `nominal`, `reduce`, `line_phase` | points, independent of the log's length |
 //! | revolutions × angle bins | `grid` | residual and station of every place |
-//! | columns of all effects and unknown patterns | `pool`, `unknown` | sums from which every fit is made |
+//! | columns of all effects and unknown patterns | `pool`, `columns`, `unknown` | sums from which every fit is made |
 //! | what does not repeat | `noise` | covariance by order, revolution and run |
 //! | how probable is a set of effects | `evidence`, `search` | models with their posterior |
-//! | tones, steps | `events` | what angle does not carry |
+//! | tones, steps, knocks | `events`, `knocks` | what angle does not carry |
 //! | probabilities, groups | `attribute` | verdict |
 //! | the gap on runs not used for the fit | `shrink` | how far it closes |
 //! | where | `locate` | tables and signature |
@@ -32,9 +32,12 @@ pub mod summary;
 pub mod unknown;
 pub mod verify;
 
+mod columns;
 mod engine;
 mod events;
+mod gram;
 mod interpolation;
+mod knocks;
 mod locate;
 mod next;
 mod shrink;

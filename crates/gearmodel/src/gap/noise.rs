@@ -16,7 +16,7 @@ pub(super) const ORDERS: usize = 8;
 /// Ramps: alone, and on cosine and sine of order 1.
 const RAMPS: usize = 3;
 /// Waves: the constant, cosine and sine of every order, and the ramps.
-pub(super) const WAVES: usize = 2 * ORDERS + 1 + RAMPS;
+pub(super) const WAVES: usize = STEADY + RAMPS;
 /// Kinds of waves: order 0 … 8, the ramp, the ramp on order 1.
 pub(super) const KINDS: usize = ORDERS + 3;
 /// Least scatter taken of an order, rad: a hundredth of the finest rig's.
@@ -37,16 +37,15 @@ pub(super) fn waves(theta1_rad: f64, part: f64) -> [f64; WAVES] {
         z[2 * order - 1] = std::f64::consts::SQRT_2 * cos;
         z[2 * order] = std::f64::consts::SQRT_2 * sin;
     }
-    let first = 2 * ORDERS + 1;
-    z[first] = ramp;
-    z[first + 1] = ramp * z[1];
-    z[first + 2] = ramp * z[2];
+    z[STEADY] = ramp;
+    z[STEADY + 1] = ramp * z[1];
+    z[STEADY + 2] = ramp * z[2];
     z
 }
 
 /// Kind of a wave.
 pub(super) fn kind(wave: usize) -> usize {
-    match wave.checked_sub(2 * ORDERS + 1) {
+    match wave.checked_sub(STEADY) {
         None => wave.div_ceil(2),
         Some(0) => ORDERS + 1,
         Some(_) => ORDERS + 2,
@@ -101,7 +100,7 @@ impl Noise {
         let fitted: Vec<Option<_>> = grid
             .revolutions
             .iter()
-            .zip(&pool.wave_products)
+            .zip(pool.wave_products())
             .zip(&residual_waves)
             .map(|((revolution, k), e)| {
                 // Without the ramps: over a whole turn they are nearly sums of the orders.
@@ -163,69 +162,117 @@ impl Noise {
     /// XᵀV⁻¹X and log det V.
     #[must_use]
     pub fn whiten(&self, grid: &Grid, pool: &Pool) -> Whitened {
-        self.whiten_runs(grid, pool, None)
+        self.within_runs(grid, pool, None).between_runs(self.run_ratio)
     }
 
-    /// The same of some columns only.
+    /// Variance of every wave between revolutions, rad².
+    fn wave_rad2(&self) -> Vec<f64> {
+        (0..WAVES).map(|w| self.order_rad2[kind(w)].max(LEAST_SCATTER_RAD * LEAST_SCATTER_RAD)).collect()
+    }
+
+    /// How the waves of a revolution with ZᵀWZ = `wave_products` are whitened.
+    pub(super) fn revolution(&self, wave_products: &DMatrix<f64>) -> Option<Passing> {
+        Passing::new(&(wave_products / self.white_rad2), &self.wave_rad2())
+    }
+
+    /// How what revolutions pass on to their run is whitened there; `left` is the sum of theirs.
+    pub(super) fn run(&self, left: &DMatrix<f64>) -> Option<Passing> {
+        Passing::new(left, &between(&self.wave_rad2(), self.run_ratio))
+    }
+
+    /// Everything that does not depend on the scatter between runs, of all columns or of some.
     #[must_use]
-    pub fn whiten_runs(&self, grid: &Grid, pool: &Pool, only: Option<&[usize]>) -> Whitened {
-        let width = pool.width();
-        let columns: Vec<usize> = only.map_or_else(|| (0..width).collect(), <[usize]>::to_vec);
-        let p = columns.len();
+    pub(super) fn within_runs(&self, grid: &Grid, pool: &Pool, only: Option<&[usize]>) -> WithinRuns {
         let precision = 1.0 / self.white_rad2;
-        let lambda: Vec<f64> =
-            (0..WAVES).map(|w| self.order_rad2[kind(w)].max(LEAST_SCATTER_RAD * LEAST_SCATTER_RAD)).collect();
-        let mut gram = if only.is_none() {
-            &pool.products * precision
-        } else {
-            DMatrix::from_fn(p, p, |a, b| pool.products[(columns[a], columns[b])] * precision)
+        let wave_rad2 = self.wave_rad2();
+        let mut gram = match only {
+            None => pool.products.clone(),
+            Some(columns) => pool.products.select_rows(columns).select_columns(columns),
         };
+        gram *= precision;
+        let p = gram.ncols();
         let mut log_det = -grid.weight.iter().map(|w| (w * precision).ln()).sum::<f64>();
         let runs = grid.directions.len();
-        let mut rows = DMatrix::zeros((grid.revolutions.len() + runs) * WAVES, p);
-        for run in 0..runs {
-            let mut run_gram = DMatrix::zeros(WAVES, WAVES);
-            let mut run_waves = DMatrix::zeros(WAVES, p);
-            for (number, revolution) in grid.revolutions.iter().enumerate().filter(|(_, r)| r.run == run) {
-                debug_assert!(!revolution.places.is_empty());
-                let k = &pool.wave_products[number] * precision;
-                let c = if only.is_none() {
-                    &pool.waves[number] * precision
-                } else {
-                    DMatrix::from_fn(WAVES, p, |w, n| pool.waves[number][(w, columns[n])] * precision)
-                };
-                let mut inner = k.clone();
-                for (n, l) in lambda.iter().enumerate() {
-                    inner[(n, n)] += 1.0 / l;
-                }
-                let Some(cholesky) = Cholesky::new(inner) else { continue };
-                log_det += 2.0 * cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
-                    + lambda.iter().map(|l| l.ln()).sum::<f64>();
-                let solved_k = cholesky.solve(&k);
-                run_gram += &k - &k * &solved_k;
-                let solved_c = cholesky.solve(&c);
-                run_waves += &c - &k * solved_c;
-                // CᵀS C = (L⁻¹C)ᵀ(L⁻¹C)
-                if let Some(half) = cholesky.l().solve_lower_triangular(&c) {
-                    rows.view_mut((number * WAVES, 0), (WAVES, p)).copy_from(&half);
-                }
-            }
-            let mut inner = run_gram;
-            let between: Vec<f64> =
-                lambda.iter().enumerate().map(|(n, l)| l * self.run_ratio[usize::from(n > 0)].max(1e-9)).collect();
-            for (n, l) in between.iter().enumerate() {
-                inner[(n, n)] += 1.0 / l;
-            }
-            let Some(cholesky) = Cholesky::new(inner) else { continue };
-            log_det += 2.0 * cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
-                + between.iter().map(|l| l.ln()).sum::<f64>();
-            if let Some(half) = cholesky.l().solve_lower_triangular(&run_waves) {
-                rows.view_mut(((grid.revolutions.len() + run) * WAVES, 0), (WAVES, p)).copy_from(&half);
+        let mut left = vec![DMatrix::zeros(WAVES, WAVES); runs];
+        let mut waves = vec![DMatrix::zeros(WAVES, p); runs];
+        let mut rows = DMatrix::zeros(grid.revolutions.len() * WAVES, p);
+        for (number, revolution) in grid.revolutions.iter().enumerate() {
+            let Some(passing) = Passing::new(&(&pool.wave_products()[number] * precision), &wave_rad2) else {
+                continue;
+            };
+            log_det += passing.log_det;
+            let c = match only {
+                None => &pool.waves[number] * precision,
+                Some(columns) => pool.waves[number].select_columns(columns) * precision,
+            };
+            left[revolution.run] += &passing.left;
+            waves[revolution.run].gemm(1.0, &passing.on, &c, 1.0);
+            rows.view_mut((number * WAVES, 0), (WAVES, p)).gemm(1.0, &passing.half, &c, 0.0);
+        }
+        gram -= super::gram::gram(&rows);
+        WithinRuns { gram, log_det, left, waves, wave_rad2 }
+    }
+}
+
+/// Variance of every wave between runs.
+fn between(wave_rad2: &[f64], run_ratio: [f64; 2]) -> Vec<f64> {
+    wave_rad2.iter().enumerate().map(|(n, l)| l * run_ratio[usize::from(n > 0)].max(1e-9)).collect()
+}
+
+/// Woodbury's identity at one level: K = ZᵀV⁻¹Z of what lies below, Λ the waves' own variance, S = (Λ⁻¹ + K)⁻¹.
+pub(super) struct Passing {
+    /// L⁻¹ with LLᵀ = Λ⁻¹ + K: what a column with ZᵀV⁻¹x = c loses is |L⁻¹c|².
+    pub half: DMatrix<f64>,
+    /// 1 − K S: what of c passes on to the next level.
+    pub on: DMatrix<f64>,
+    /// K − K S K: what of K does.
+    pub left: DMatrix<f64>,
+    /// log det(Λ⁻¹ + K) + log det Λ.
+    pub log_det: f64,
+}
+
+impl Passing {
+    fn new(k: &DMatrix<f64>, variances: &[f64]) -> Option<Self> {
+        let mut inner = k.clone();
+        for (n, variance) in variances.iter().enumerate() {
+            inner[(n, n)] += 1.0 / variance;
+        }
+        let cholesky = Cholesky::new(inner)?;
+        let log_det = 2.0 * cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
+            + variances.iter().map(|l| l.ln()).sum::<f64>();
+        let n = variances.len();
+        let half = cholesky.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
+        let on = DMatrix::identity(n, n) - k * (half.transpose() * &half);
+        let left = &on * k;
+        Some(Self { half, on, left, log_det })
+    }
+}
+
+/// Sums whitened as far as revolutions go.
+pub(super) struct WithinRuns {
+    gram: DMatrix<f64>,
+    log_det: f64,
+    /// What is left of ZᵀV⁻¹Z, by run.
+    left: Vec<DMatrix<f64>>,
+    /// What is left of ZᵀV⁻¹X, by run.
+    waves: Vec<DMatrix<f64>>,
+    wave_rad2: Vec<f64>,
+}
+
+impl WithinRuns {
+    /// The rest of the way: with scatter between runs.
+    pub(super) fn between_runs(&self, run_ratio: [f64; 2]) -> Whitened {
+        let variances = between(&self.wave_rad2, run_ratio);
+        let p = self.gram.ncols();
+        let mut rows = DMatrix::zeros(self.left.len() * WAVES, p);
+        let mut log_det = self.log_det;
+        for (run, (left, waves)) in self.left.iter().zip(&self.waves).enumerate() {
+            if let Some(passing) = Passing::new(left, &variances) {
+                log_det += passing.log_det;
+                rows.view_mut((run * WAVES, 0), (WAVES, p)).gemm(1.0, &passing.half, waves, 0.0);
             }
         }
-        // The transpose made first: only then is the product blocked for the caches.
-        gram -= rows.transpose() * &rows;
-        Whitened { gram, log_det }
+        Whitened { gram: &self.gram - super::gram::gram(&rows), log_det }
     }
 }
 

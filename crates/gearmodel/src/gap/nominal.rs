@@ -99,7 +99,6 @@ impl Nominal {
                     speed_rad_per_s,
                     time_s: point.time_s - start_s,
                     way_rev: ledger.book.way_rev.iter().sum(),
-                    net_rev: ledger.book.signed_rev.iter().sum(),
                     ledger: ledger.book,
                     ..rig.station(point.theta1_rad, point.theta2_rad, run.direction)
                 };

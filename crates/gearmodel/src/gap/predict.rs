@@ -61,7 +61,6 @@ impl Condition {
             speed_rad_per_s: sense * self.speed_rpm * std::f64::consts::TAU / 60.0,
             time_s: self.time_s,
             way_rev: self.revolutions,
-            net_rev: sense * self.revolutions,
             ledger,
             ..rig.station(theta1_rad, rig.pair().theta2(theta1_rad), self.direction)
         }

@@ -27,6 +27,8 @@ pub struct Point {
     pub rho_rad: f64,
     /// Load, N·m.
     pub load_nm: f64,
+    /// Variance of the samples' driver angle, rad².
+    pub spread_rad2: f64,
     /// Samples.
     pub samples: f64,
     /// Mean of the encoders' line waves as TE shows them.
@@ -123,6 +125,7 @@ impl<'a> Reducer<'a> {
         }
         stretch.sum.time_s += sample.time_s - stretch.origin.time_s;
         stretch.sum.theta1_rad += step;
+        stretch.sum.spread_rad2 += step * step;
         stretch.sum.theta2_rad += f_rad - stretch.theta2_rad;
         stretch.sum.rho_rad += deviation;
         stretch.sum.load_nm += sample.load_nm;
@@ -136,7 +139,8 @@ impl<'a> Reducer<'a> {
         let Stretch { origin, theta2_rad, sum, squares, .. } = self.stretch;
         let n = sum.samples;
         let mean = sum.rho_rad / n;
-        let theta1_rad = origin.theta1_rad + sum.theta1_rad / n;
+        let step = sum.theta1_rad / n;
+        let theta1_rad = origin.theta1_rad + step;
         let load_nm = sum.load_nm / n;
         self.run.points.push(Point {
             time_s: origin.time_s + sum.time_s / n,
@@ -144,6 +148,7 @@ impl<'a> Reducer<'a> {
             theta2_rad: theta2_rad + sum.theta2_rad / n,
             rho_rad: mean - self.nominal.te_rad(theta1_rad, self.run.direction, load_nm),
             load_nm,
+            spread_rad2: (sum.spread_rad2 / n - step * step).max(0.0),
             samples: n,
             lines: sum.lines.map(|x| x / n),
         });

@@ -3,12 +3,15 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::*;
-use crate::effect::{Parameter, Value};
+use crate::effect::{Carrier, Parameter, Parity, Signature, Value};
 use crate::gap::line_phase::LineError;
 use crate::gap::shrink::{HeldOut, Selection};
 
-/// Flattens what the noise model's own error makes too sure; calibrated on simulated campaigns.
-const SHARPNESS: f64 = 0.85;
+/// Under 1 it flattens what the noise model's own error makes too sure; calibrated on simulated campaigns.
+const SHARPNESS: f64 = 1.0;
+/// Standard deviations are this much larger than under the noise model alone, whose own error they do not know; calibrated on
+/// simulated campaigns.
+const WIDER: f64 = 1.25;
 /// How exact parameters are at best, in parts of their value, and phases in rad.
 const LINEARISED: f64 = 0.006;
 /// Members of a group nearer than this have one and the same trace, deg.
@@ -17,8 +20,8 @@ const IDENTICAL_DEG: f64 = 0.2;
 const MIMIC_DEG: f64 = 4.0;
 /// Most warnings of such sums.
 const MOST_MIMICS: usize = 5;
-/// Probability of a tone that was found over all frequencies.
-const TONE_PROBABILITY: f64 = 0.99;
+/// Probability of a tone that was found over all frequencies, and of knocks far out of the scatter.
+const EVENT_PROBABILITY: f64 = 0.99;
 /// Prior odds of a sub-divisional error.
 const LINE_ODDS: f64 = 0.04;
 /// An effect or a remainder under this part of what was found may be the found effects' own inexactness; under this part of the
@@ -26,7 +29,7 @@ const LINE_ODDS: f64 = 0.04;
 const INEXACT: f64 = 0.05;
 
 /// Largest probability of what may be no more than that.
-const INEXACT_PROBABILITY: f64 = 0.2;
+const INEXACT_PROBABILITY: f64 = 0.02;
 
 /// What is named, and groups whose members have one and the same trace with the probability that one of them is there.
 struct Named {
@@ -63,10 +66,9 @@ impl Engine<'_> {
         let floor_rad2 = held_out.floor_rad2(&self.grid, &self.noise);
         let before = held_out.errors(&Selection::default());
         let after = held_out.errors(&self.selection(best));
-        let found = !best.fit.set.is_empty() || !lines.is_empty() || !self.tones.is_empty();
+        let found = !best.fit.set.is_empty() || !lines.is_empty() || !self.aside.is_empty();
         let lines_rad2 = lines.iter().map(|l| l.explained_rad2).sum::<f64>() / self.grid.samples;
-        let explained_rad2 =
-            lines_rad2 + self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum::<f64>();
+        let explained_rad2 = lines_rad2 + self.aside.mean_square_rad2();
         // What the place's own samples scatter, less what the lines explain of it.
         let within_rad2 = self.grid.within_rad2 / self.grid.samples;
         let mut gap = shrink::gap(&before, &after, floor_rad2, within_rad2, explained_rad2, found);
@@ -122,7 +124,6 @@ impl Engine<'_> {
             noise: &self.noise,
             best: &best.fit,
             lines,
-            leading: found.effects.first(),
         });
         let confusability = self.confusability(&findings, best);
         let mut warnings = locate::warnings(&self.grid, &self.noise);
@@ -167,9 +168,7 @@ impl Engine<'_> {
             let own: Vec<usize> = (0..self.pool.blocks.len())
                 .filter(|b| matches!(&self.pool.blocks[*b].cause, Cause::Effect { number: n, .. } if *n == number))
                 .collect();
-            if let Some(encoder) =
-                ["encoder1_interpolation", "encoder2_interpolation"].iter().position(|n| *n == effect.name())
-            {
+            if let Some(encoder) = INTERPOLATION.iter().position(|n| *n == effect.name()) {
                 findings.push(self.line_finding(number, encoder, lines));
                 continue;
             }
@@ -180,64 +179,42 @@ impl Engine<'_> {
                 own.iter().zip(gains).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(b, _)| *b)
             });
             let Some(block) = block else { continue };
-            let in_best = best.fit.set.contains(&block);
-            let score_with = |search: &mut Search<'_>, out: Option<usize>, b: usize| {
+            // The block of the best model that this one would stand in for: itself, or one with the same trace.
+            let stands_for = best.fit.set.iter().copied().find(|b| *b == block).or_else(|| {
+                best.fit
+                    .set
+                    .iter()
+                    .copied()
+                    .find(|b| attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG)
+            });
+            let in_best = stands_for == Some(block);
+            let mut model_with = |out: Option<usize>, b: usize| {
                 let mut set: Vec<usize> = best.fit.set.iter().copied().filter(|x| Some(*x) != out).collect();
                 set.push(b);
                 search.model(set, Some(&best.fit))
             };
-            let twins = if attribution.probability[number] > 0.02 {
-                let reference = if in_best {
-                    Some(best.score)
-                } else {
-                    // Judged beside the block that it would replace.
-                    best.fit
-                        .set
-                        .iter()
-                        .find(|b| attribute::angle_deg(&self.pool, &self.whitened, **b, block) < attribute::SAME_DEG)
-                        .and_then(|b| score_with(search, Some(*b), block))
-                        .map(|m| m.score)
-                };
-                reference.map_or_else(Vec::new, |reference| {
-                    let cell = std::cell::RefCell::new(&mut *search);
-                    let replaced =
-                        if in_best {
-                            Some(block)
-                        } else {
-                            best.fit.set.iter().copied().find(|b| {
-                                attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG
-                            })
-                        };
-                    twins(
-                        &self.pool,
-                        &self.whitened,
-                        attribution,
-                        number,
-                        &|b| score_with(&mut cell.borrow_mut(), replaced, b).map(|m| m.score),
-                        reference.max(best.score - 3.0),
-                    )
-                })
+            let reference = if in_best {
+                Some(best.score)
             } else {
-                Vec::new()
+                stands_for.and_then(|b| model_with(Some(b), block)).map(|m| m.score)
             };
-            // Amplitudes: in the best model, in place of its twin there, or beside it.
-            let model = if in_best {
-                Some(best.clone())
-            } else {
-                let twin = best.fit.set.iter().copied().find(|b| match &self.pool.blocks[*b].cause {
-                    Cause::Effect { number: n, .. } => {
-                        *n == number
-                            || attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG
-                    }
-                    Cause::Unknown(_) => false,
-                });
-                score_with(search, twin, block)
+            let twins = match reference.filter(|_| attribution.probability[number] > 0.02) {
+                Some(reference) => twins(
+                    &self.pool,
+                    &self.whitened,
+                    attribution,
+                    number,
+                    &mut |b| model_with(stands_for, b).map(|m| m.score),
+                    reference.max(best.score - 3.0),
+                ),
+                None => Vec::new(),
             };
+            // Amplitudes: in the best model, in place of its twin or of another shape there, or beside it.
+            let other_shape = best.fit.set.iter().copied().find(|b| own.contains(b));
+            let model = if in_best { Some(best.clone()) } else { model_with(other_shape.or(stands_for), block) };
             let estimate = model.as_ref().and_then(|m| {
                 let n = m.fit.set.iter().position(|b| *b == block)?;
-                let place = m.fit.place(&self.pool, n);
-                let rms: f64 = m.fit.mean.rows(place.start, place.len()).norm();
-                Some((self.raw(m, n), rms))
+                Some((self.raw(m, n), m.fit.rms_rad(&self.pool, n)))
             });
             let shape = match &self.pool.blocks[block].cause {
                 Cause::Effect { shape, .. } => shape.clone(),
@@ -299,10 +276,15 @@ impl Engine<'_> {
                     .collect()
             })
             .unwrap_or_default();
-        // A rate of events needs the campaign's length, which an effect does not know.
-        if let Some(steps) = parameters.get("steps").and_then(|entry| entry["value"].as_f64()) {
-            let per_rev = steps / self.grid.plan.revolutions.max(f64::MIN_POSITIVE);
-            parameters.insert("per_rev".to_owned(), json!({"value": per_rev, "std": null, "unit": "1/rev"}));
+        // Events and their rate: one follows from the other by the campaign's length, which an effect does not know.
+        let revolutions = self.grid.plan.revolutions.max(f64::MIN_POSITIVE);
+        let number = |name: &str| parameters.get(name).and_then(|entry| entry["value"].as_f64());
+        if let Some(steps) = number("steps") {
+            parameters
+                .insert("per_rev".to_owned(), json!({"value": steps / revolutions, "std": null, "unit": "1/rev"}));
+        } else if let Some(per_rev) = number("per_rev") {
+            parameters
+                .insert("steps".to_owned(), json!({"value": (per_rev * revolutions).round(), "std": null, "unit": ""}));
         }
         EffectFinding {
             name: effect.name().to_owned(),
@@ -388,13 +370,24 @@ impl Engine<'_> {
                 Cause::Effect { .. } => known += size,
             }
         }
-        square += self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum::<f64>();
+        square += self.aside.mean_square_rad2();
         let rms_rad = square.sqrt();
         let least_rad = INEXACT * known.max(floor_rad * floor_rad).max(lines_rad2).sqrt();
-        if let Some(tone) = self.tones.first().filter(|tone| tone.amplitude_rad > least_rad) {
+        if let Some(knocks) = self.aside.knocks.filter(|knocks| knocks.mean_square_rad2.sqrt() > least_rad) {
+            let description = format!(
+                "{} knocks or lost readings of up to {:.0} urad, the first at {:.2} s",
+                knocks.count,
+                knocks.peak_rad * 1e6,
+                knocks.first_s
+            );
+            let signature = Signature::steady(Carrier::None, Parity::Mixed);
+            let location = Some(UnknownLocation { description, signature });
+            return Unknown { probability: EVENT_PROBABILITY, rms_rad, location };
+        }
+        if let Some(tone) = self.aside.tones.first().filter(|tone| tone.amplitude_rad > least_rad) {
             let pattern = Pattern::Tone { frequency_hz: tone.frequency_hz };
             let location = Some(UnknownLocation { description: pattern.describe(), signature: pattern.signature() });
-            return Unknown { probability: TONE_PROBABILITY, rms_rad, location };
+            return Unknown { probability: EVENT_PROBABILITY, rms_rad, location };
         }
         // Effects are linearised and their shapes lie on grids: a small part of them may stay behind.
         let inexact = square > 0.0 && rms_rad < INEXACT * known.max(floor_rad * floor_rad).sqrt();
@@ -442,7 +435,7 @@ impl Engine<'_> {
         for line in lines {
             let share = line.explained_rad2 / self.grid.samples / reducible;
             explained += share;
-            let effect = ["encoder1_interpolation", "encoder2_interpolation"][line.encoder].to_owned();
+            let effect = INTERPOLATION[line.encoder].to_owned();
             match rows.iter_mut().find(|row| row.effect == effect) {
                 Some(row) => row.share += share,
                 None => rows.push(BudgetRow { effect, share, interval: None }),
@@ -580,7 +573,7 @@ fn parameter(parameter: &Parameter) -> Json {
         (Value::Number(x), Some(std)) => {
             // A phase has no size of its own.
             let inexact = if parameter.name.starts_with("ph") { LINEARISED } else { LINEARISED * x.abs() };
-            Some(if std > 0.0 { std.hypot(inexact) } else { std })
+            Some(if std > 0.0 { (WIDER * std).hypot(inexact) } else { std })
         }
         (_, std) => std,
     };

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::evidence::{Fit, fit, scan};
+use super::evidence::{Fit, WIDE, fit, scan};
 use super::noise::Whitened;
 use super::pool::{Cause, Pool};
 
@@ -20,6 +20,17 @@ const TRIED: usize = 5;
 const MOST_RANKED: usize = 60;
 /// Starts beside the empty set.
 const STARTS: usize = 4;
+
+/// What may join a set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Allowed {
+    /// Effects of few columns.
+    Narrow,
+    /// All effects.
+    Library,
+    /// Effects and patterns outside the library.
+    All,
+}
 
 /// A set with its log posterior, not normalised.
 #[derive(Clone, Debug)]
@@ -41,7 +52,7 @@ pub struct Search<'a> {
     offset: f64,
     priors: Vec<f64>,
     seen: HashMap<Vec<usize>, Option<Model>>,
-    scanned: HashMap<(Vec<usize>, bool), Ranking>,
+    scanned: HashMap<(Vec<usize>, Allowed), Ranking>,
 }
 
 impl<'a> Search<'a> {
@@ -56,7 +67,7 @@ impl<'a> Search<'a> {
                 // What is known to be there needs no evidence.
                 Cause::Effect { effect, .. } if known.iter().any(|name| name == effect.name()) => KNOWN_NATS,
                 Cause::Effect { cost_nats, .. } => EFFECT_ODDS.ln() - cost_nats,
-                Cause::Unknown(_) => UNKNOWN_ODDS.ln() - unknowns.ln(),
+                Cause::Unknown(pattern) => UNKNOWN_ODDS.ln() - unknowns.ln() - pattern.cost_nats(),
             })
             .collect();
         let offset = -0.5 * whitened.log_det - 0.5 * whitened.gram[(0, 0)];
@@ -91,23 +102,26 @@ impl<'a> Search<'a> {
     }
 
     /// Candidates that may join a set: one shape of an effect at a time.
-    fn open(&self, set: &[usize], unknown: bool) -> Vec<usize> {
+    fn open(&self, set: &[usize], allowed: Allowed) -> Vec<usize> {
         (0..self.pool.blocks.len())
             .filter(|b| !set.contains(b))
             .filter(|b| match self.library(*b) {
-                Some(number) => !set.iter().any(|s| self.library(*s) == Some(number)),
-                None => unknown,
+                Some(number) => {
+                    (allowed != Allowed::Narrow || self.pool.blocks[*b].width() <= WIDE)
+                        && !set.iter().any(|s| self.library(*s) == Some(number))
+                }
+                None => allowed == Allowed::All,
             })
             .collect()
     }
 
     /// The best additions to a model: (block, score by the scan).
-    fn additions(&mut self, model: &Model, unknown: bool, count: usize) -> Ranking {
-        let key = (model.fit.set.clone(), unknown);
+    fn additions(&mut self, model: &Model, allowed: Allowed, count: usize) -> Ranking {
+        let key = (model.fit.set.clone(), allowed);
         if let Some(known) = self.scanned.get(&key) {
             return known[..count.min(known.len())].to_vec();
         }
-        let candidates = self.open(&model.fit.set, unknown);
+        let candidates = self.open(&model.fit.set, allowed);
         let gains = scan(self.pool, self.whitened, &model.fit, &candidates);
         let mut ranked: Ranking =
             candidates.iter().zip(gains).map(|(b, gain)| (*b, model.score + gain + self.priors[*b])).collect();
@@ -119,7 +133,7 @@ impl<'a> Search<'a> {
     }
 
     /// Climbs from a set to where no addition, removal or swap raises the posterior.
-    pub fn climb(&mut self, start: Vec<usize>, unknown: bool) -> Option<Model> {
+    pub fn climb(&mut self, start: Vec<usize>, allowed: Allowed) -> Option<Model> {
         let mut best = self.model(start, None)?;
         for _ in 0..40 {
             let mut next = best.clone();
@@ -131,7 +145,7 @@ impl<'a> Search<'a> {
                 }
             };
             if best.fit.set.len() < LARGEST_SET {
-                for (block, score) in self.additions(&best, unknown, TRIED) {
+                for (block, score) in self.additions(&best, allowed, TRIED) {
                     if score > best.score - 3.0 {
                         consider(self, with(&best.fit.set, block), &best.fit);
                     }
@@ -142,11 +156,15 @@ impl<'a> Search<'a> {
                 set.remove(n);
                 let Some(fewer) = self.model(set.clone(), Some(&best.fit)) else { continue };
                 consider(self, set.clone(), &best.fit);
-                for (block, score) in self.additions(&fewer, unknown, TRIED) {
+                for (block, score) in self.additions(&fewer, allowed, TRIED) {
                     if score > best.score - 3.0 {
                         consider(self, with(&set, block), &best.fit);
                     }
                 }
+            }
+            if next.score <= best.score + 1e-6 {
+                // At the top of one hill: one effect may stand for two that together look like it.
+                next = self.one_for_two(&best, allowed).unwrap_or(next);
             }
             if next.score <= best.score + 1e-6 {
                 break;
@@ -156,26 +174,53 @@ impl<'a> Search<'a> {
         Some(best)
     }
 
+    /// The best model with one block in place of two, where that is better.
+    fn one_for_two(&mut self, best: &Model, allowed: Allowed) -> Option<Model> {
+        let mut better: Option<Model> = None;
+        let set = &best.fit.set;
+        for m in 0..set.len() {
+            for n in 0..m {
+                let rest: Vec<usize> = set.iter().copied().filter(|b| *b != set[m] && *b != set[n]).collect();
+                let Some(fewer) = self.model(rest.clone(), Some(&best.fit)) else { continue };
+                for (block, score) in self.additions(&fewer, allowed, TRIED) {
+                    if score > best.score - 3.0
+                        && let Some(model) = self.model(with(&rest, block), Some(&best.fit))
+                        && model.score > better.as_ref().map_or(best.score + 1e-6, |b| b.score)
+                    {
+                        better = Some(model);
+                    }
+                }
+            }
+        }
+        better
+    }
+
     /// The best model: the library first from several starts, then with patterns outside it.
     pub fn run(&mut self) -> Option<Model> {
         let empty = self.model(Vec::new(), None)?;
-        let mut best = self.climb(Vec::new(), false)?;
-        for (block, score) in self.additions(&empty, false, STARTS) {
+        let mut best = self.climb(Vec::new(), Allowed::Library)?;
+        // A wide block takes up what a few narrow ones would explain, and is not given up again: those first, without it.
+        let narrow = self.climb(Vec::new(), Allowed::Narrow)?;
+        let narrow = self.climb(narrow.fit.set, Allowed::Library)?;
+        if narrow.score > best.score {
+            best = narrow;
+        }
+        for (block, score) in self.additions(&empty, Allowed::Library, STARTS) {
             if score < empty.score - 2.0 {
                 continue;
             }
-            if let Some(model) = self.climb(vec![block], false)
+            if let Some(model) = self.climb(vec![block], Allowed::Library)
                 && model.score > best.score
             {
                 best = model;
             }
         }
-        let mut with_unknown = self.climb(best.fit.set, true)?;
+        let mut with_unknown = self.climb(best.fit.set, Allowed::All)?;
         // And the other way round: what lies outside may be the larger part.
-        if let Some((block, score)) = self.additions(&empty, true, 1).into_iter().next()
+        if let Some((block, score)) = self.additions(&empty, Allowed::All, 1).into_iter().next()
             && score > empty.score
             && self.library(block).is_none()
-            && let Some(model) = self.climb(vec![block], true)
+            && let Some(model) = self.climb(vec![block], Allowed::All)
             && model.score > with_unknown.score
         {
             with_unknown = model;
@@ -186,7 +231,7 @@ impl<'a> Search<'a> {
     /// Looks around a model so that what competes with it has been seen: additions, removals, swaps.
     pub fn explore(&mut self, best: &Model) {
         let room = 9.0;
-        for (block, score) in self.additions(best, true, 60) {
+        for (block, score) in self.additions(best, Allowed::All, 60) {
             if score > best.score - room {
                 self.model(with(&best.fit.set, block), Some(&best.fit));
             }
@@ -195,7 +240,7 @@ impl<'a> Search<'a> {
             let mut set = best.fit.set.clone();
             set.remove(n);
             let Some(fewer) = self.model(set.clone(), Some(&best.fit)) else { continue };
-            for (block, score) in self.additions(&fewer, true, 40) {
+            for (block, score) in self.additions(&fewer, Allowed::All, 40) {
                 if score > best.score - room {
                     self.model(with(&set, block), Some(&best.fit));
                 }

@@ -3,11 +3,13 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
 
 use super::diagnosis::Gap;
 use super::evidence::{RESIDUAL, ZERO};
+use super::gram;
 use super::grid::Grid;
-use super::noise::{Noise, WAVES, kind, waves};
+use super::noise::{Noise, WAVES};
 use super::pool::Pool;
 
 /// Resamples of the revolutions for intervals.
@@ -60,53 +62,40 @@ impl HeldOut {
         let mut all = vec![RESIDUAL, ZERO];
         all.extend(columns.iter().copied().filter(|c| *c != ZERO && *c != RESIDUAL));
         all.dedup();
-        let values: Vec<Vec<f64>> = all.iter().map(|c| pool.column(grid, *c)).collect();
+        let values: Vec<Vec<f64>> = all.par_iter().map(|c| pool.column(grid, *c)).collect();
         let by_run = grid.plan.runs > 1;
         let units = if by_run { grid.directions.len() } else { grid.revolutions.len() };
         let p = all.len();
         let precision = 1.0 / noise.white_rad2;
-        let lambda: Vec<f64> = (0..WAVES).map(|w| noise.order_rad2[kind(w)].max(1e-16)).collect();
+        let squares: Vec<DMatrix<f64>> = grid
+            .revolutions
+            .par_iter()
+            .map(|revolution| {
+                let at = revolution.places.clone();
+                let x = DMatrix::from_fn(at.len(), p, |n, c| values[c][at.start + n]);
+                gram::weighted(&x, &grid.weight[at])
+            })
+            .collect();
         let mut grams = vec![DMatrix::zeros(p, p); units];
-        let mut squares = Vec::new();
         let mut revolutions = Vec::new();
         let mut run_sums: Vec<(DMatrix<f64>, DMatrix<f64>)> =
             vec![(DMatrix::zeros(WAVES, WAVES), DMatrix::zeros(WAVES, p)); units];
-        for (number, revolution) in grid.revolutions.iter().enumerate() {
+        for (number, (revolution, square)) in grid.revolutions.iter().zip(&squares).enumerate() {
             let unit = if by_run { revolution.run } else { number };
-            let count = revolution.places.len();
-            let x = DMatrix::from_fn(count, p, |n, c| values[c][revolution.places.start + n]);
-            let mut wx = x.clone();
-            for (n, mut row) in wx.row_iter_mut().enumerate() {
-                row *= grid.weight[revolution.places.start + n];
+            let c = pool.waves[number].select_columns(&all) * precision;
+            if let Some(passing) = noise.revolution(&pool.wave_products()[number]) {
+                let lost = &passing.half * &c;
+                grams[unit] += square * precision - lost.transpose() * &lost;
+                run_sums[unit].0 += &passing.left;
+                run_sums[unit].1 += &passing.on * &c;
             }
-            let square = x.transpose() * &wx;
-            let z = DMatrix::from_fn(WAVES, count, |w, n| {
-                let place = revolution.places.start + n;
-                let cell = grid.cell_of[place];
-                waves(grid.cells[cell].theta1_rad, grid.part_of_cell[cell])[w]
-            });
-            let c = z * wx * precision;
-            let k = &pool.wave_products[number] * precision;
-            let mut inner = k.clone();
-            for (n, l) in lambda.iter().enumerate() {
-                inner[(n, n)] += 1.0 / l;
-            }
-            if let Some(cholesky) = Cholesky::new(inner) {
-                grams[unit] += &square * precision - c.transpose() * cholesky.solve(&c);
-                run_sums[unit].0 += &k - &k * cholesky.solve(&k);
-                run_sums[unit].1 += &c - &k * cholesky.solve(&c);
-            }
-            squares.push(square);
             revolutions.push((unit, grid.weight[revolution.places.clone()].iter().sum()));
         }
         if by_run {
-            for (gram, (k, c)) in grams.iter_mut().zip(&run_sums) {
-                let mut inner = k.clone();
-                for (n, l) in lambda.iter().enumerate() {
-                    inner[(n, n)] += 1.0 / (l * noise.run_ratio[usize::from(n > 0)].max(1e-9));
-                }
-                if let Some(cholesky) = Cholesky::new(inner) {
-                    *gram -= c.tr_mul(&cholesky.solve(c));
+            for (gram, (left, c)) in grams.iter_mut().zip(&run_sums) {
+                if let Some(passing) = noise.run(left) {
+                    let lost = &passing.half * c;
+                    *gram -= lost.transpose() * &lost;
                 }
             }
         }

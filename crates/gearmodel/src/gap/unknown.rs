@@ -10,6 +10,12 @@ const LEAST_TURN: f64 = 0.9;
 /// Highest order of waves that do not close with the turn.
 const HIGHEST_WANDERING: f64 = 3.5;
 
+/// Orders of a smooth pattern.
+const SMOOTH_ORDERS: usize = 18;
+
+/// What the choice of a wave that does not close with the turn costs, nats.
+const WANDERING_COST_NATS: f64 = 5.0;
+
 /// How a pattern scales with the condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
@@ -45,6 +51,11 @@ pub enum Pattern {
         shaft: Shaft,
         /// Order; 0 is a constant.
         order: u32,
+        /// Sense.
+        sense: f64,
+    },
+    /// All low orders of the driver in one sense only: whatever is smooth over its turn.
+    Smooth {
         /// Sense.
         sense: f64,
     },
@@ -114,6 +125,9 @@ impl Pattern {
         if both {
             patterns.push(Self::Level { odd: true, weight: Weight::One, mean: 1.0 });
             for sense in [1.0, -1.0] {
+                if shafts.contains(&Shaft::Input) {
+                    patterns.push(Self::Smooth { sense });
+                }
                 for &shaft in &shafts {
                     for order in 1..=4 {
                         patterns.push(Self::OneSense { shaft, order, sense });
@@ -139,11 +153,11 @@ impl Pattern {
             .collect()
     }
 
-    /// The same wave with orders closer about its own.
+    /// The same wave with orders closer about its own; none where it closes with the turn.
     #[must_use]
     pub fn nearer(&self, step: f64) -> Vec<Self> {
         match self {
-            Self::Order { shaft, order, odd, weight, mean } => [-0.5, -0.25, 0.25, 0.5]
+            Self::Order { shaft, order, odd, weight, mean } if order.fract() != 0.0 => [-0.5, -0.25, 0.25, 0.5]
                 .into_iter()
                 .map(|part| Self::Order {
                     shaft: *shaft,
@@ -170,7 +184,18 @@ impl Pattern {
                 }
             }
             Self::Level { .. } | Self::Step { .. } => 1,
+            Self::Smooth { .. } => 2 * SMOOTH_ORDERS,
             Self::RunLevels { runs } => runs - 1,
+        }
+    }
+
+    /// What it costs that it was chosen from many, nats.
+    #[must_use]
+    pub fn cost_nats(&self) -> f64 {
+        match self {
+            // The grid of orders and those between.
+            Self::Order { order, .. } if order.fract() != 0.0 => WANDERING_COST_NATS,
+            _ => 0.0,
         }
     }
 
@@ -196,20 +221,23 @@ impl Pattern {
             };
             if odd { at.sense * size } else { size }
         };
-        let angle = |shaft: Shaft| if shaft == Shaft::Input { at.theta1_rad } else { at.theta2_rad };
         match self {
             Self::Order { shaft, order, odd, weight, mean } => {
-                let gain = scale(*weight, *mean, *odd);
-                let (sin, cos) = (order * angle(*shaft)).sin_cos();
-                row[0] = gain * sin;
-                row[1] = gain * cos;
+                at.wave(*shaft, *order, scale(*weight, *mean, *odd), row);
             }
             Self::OneSense { shaft, order, sense } => {
                 if at.sense * sense > 0.0 {
-                    let (sin, cos) = (f64::from(*order) * angle(*shaft)).sin_cos();
+                    let (sin, cos) = (f64::from(*order) * at.angle_rad(*shaft)).sin_cos();
                     row[0] = cos;
                     if *order > 0 {
                         row[1] = sin;
+                    }
+                }
+            }
+            Self::Smooth { sense } => {
+                if at.sense * sense > 0.0 {
+                    for (order, columns) in (1_u32..).zip(row.chunks_exact_mut(2)) {
+                        at.wave(Shaft::Input, f64::from(order), 1.0, columns);
                     }
                 }
             }
@@ -249,6 +277,10 @@ impl Pattern {
                 let sense = if *sense > 0.0 { "ccw" } else { "cw" };
                 format!("order {order} of the {} when driving {sense} only", shaft_name(shaft))
             }
+            Self::Smooth { sense } => {
+                let sense = if *sense > 0.0 { "ccw" } else { "cw" };
+                format!("a smooth pattern over the driver's turn when driving {sense} only")
+            }
             Self::Level { odd, weight, .. } => format!("an offset, {}", scaled(*odd, *weight)),
             Self::RunLevels { .. } => "an offset that differs from run to run".to_owned(),
             Self::Tone { frequency_hz } => format!("a tone of {frequency_hz:.4} Hz in time"),
@@ -259,7 +291,6 @@ impl Pattern {
     /// Its signature row.
     #[must_use]
     pub fn signature(&self) -> Signature {
-        let carrier_of = |shaft: &Shaft| if *shaft == Shaft::Input { Carrier::Input } else { Carrier::Output };
         let parity_of = |odd: bool| if odd { Parity::Odd } else { Parity::Even };
         let scaled = |carrier, odd, weight| {
             let steady = Signature::steady(carrier, parity_of(odd));
@@ -271,8 +302,9 @@ impl Pattern {
             }
         };
         match self {
-            Self::Order { shaft, odd, weight, .. } => scaled(carrier_of(shaft), *odd, *weight),
-            Self::OneSense { shaft, .. } => Signature::steady(carrier_of(shaft), Parity::OneFlank),
+            Self::Order { shaft, odd, weight, .. } => scaled(shaft.carrier(), *odd, *weight),
+            Self::OneSense { shaft, .. } => Signature::steady(shaft.carrier(), Parity::OneFlank),
+            Self::Smooth { .. } => Signature::steady(Carrier::Input, Parity::OneFlank),
             Self::Level { odd, weight, .. } => scaled(Carrier::None, *odd, *weight),
             Self::RunLevels { .. } | Self::Step { .. } => Signature::steady(Carrier::None, Parity::Mixed),
             Self::Tone { .. } => Signature::steady(Carrier::Time, Parity::Mixed),

@@ -1,0 +1,64 @@
+//! An encoder's disc sits off its shaft's axis by eps track radii (n = 1), or it or its hub is out of round (n = 2): it reads
+//! θ + eps sin(nθ − φ) to first order. Seen in TE as −i eps sin(nθ1 − φ) for the input encoder, eps sin(nθ2 − φ) for the output
+//! encoder.
+
+use super::{Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
+
+/// Order 1 or 2 of the input or output encoder's disc.
+pub(super) struct EncoderDisc {
+    pub(super) shaft: Shaft,
+    pub(super) order: Order,
+}
+
+/// What is wrong with the disc.
+#[derive(Clone, Copy)]
+pub(super) enum Order {
+    Eccentricity = 1,
+    Ellipticity = 2,
+}
+
+impl Effect for EncoderDisc {
+    fn name(&self) -> &'static str {
+        match (self.shaft, self.order) {
+            (Shaft::Input, Order::Eccentricity) => "encoder1_eccentricity",
+            (Shaft::Output, Order::Eccentricity) => "encoder2_eccentricity",
+            (Shaft::Input, Order::Ellipticity) => "encoder1_ellipticity",
+            (Shaft::Output, Order::Ellipticity) => "encoder2_ellipticity",
+        }
+    }
+
+    fn component(&self) -> &'static str {
+        match self.shaft {
+            Shaft::Input => "input encoder",
+            Shaft::Output => "output encoder",
+        }
+    }
+
+    fn signature(&self) -> Signature {
+        Signature::steady(self.shaft.carrier(), Parity::Even)
+    }
+
+    fn applies(&self, _rig: &Rig) -> bool {
+        true
+    }
+
+    fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
+        2
+    }
+
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+        at.reading_error(self.shaft, f64::from(self.order as u8), row);
+    }
+
+    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+        found.polar(0).parameters("eps", "")
+    }
+
+    fn parameter_names(&self) -> &'static [&'static str] {
+        &["eps", "phase_rad"]
+    }
+
+    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+        Ok((Shape::new(), given.polar("eps")?))
+    }
+}
