@@ -226,7 +226,7 @@ fn find_steps(sectors: &[Sector], tied: bool) -> Option<(Vec<f64>, f64)> {
                 }
             }
             let steps = steps_in(sectors, tied, &counts);
-            (steps > 0).then(|| (flat - cost - STEP_NATS * steps as f64, counts))
+            (steps > 0).then_some((flat - cost - STEP_NATS * steps as f64, counts))
         })
         .collect();
     let mut best: Option<(f64, Vec<usize>)> = None;

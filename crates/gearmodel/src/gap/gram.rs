@@ -68,7 +68,7 @@ mod tests {
         for n in [1, SMALL - 1, SMALL, PANEL, 3 * PANEL + 7] {
             let a = DMatrix::from_fn(29, n, |i, j| ((i * 31 + j * 17) % 23) as f64 - 11.0);
             assert_eq!(gram(&a), a.transpose() * &a, "{n} columns");
-            let weight: Vec<f64> = (0..29).map(|i| 1.0 + (i % 3) as f64).collect();
+            let weight: Vec<f64> = (0..29).map(|i| 1.0 + f64::from(i % 3)).collect();
             let b = DMatrix::from_fn(29, 5, |i, j| (i + 2 * j) as f64);
             let mut weighted = a.clone();
             for (mut row, w) in weighted.row_iter_mut().zip(&weight) {

@@ -50,7 +50,7 @@ pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
     for run in 0..grid.directions.len() {
         let mut places = grid.revolutions.iter().filter(|r| r.run == run).map(|r| r.places.clone());
         let Some(first) = places.next() else { continue };
-        let of_run = first.start..places.last().map_or(first.end, |last| last.end);
+        let of_run = first.start..places.next_back().map_or(first.end, |last| last.end);
         let mut at = of_run.start;
         while let Some(begin) = (at..of_run.end).find(|p| even[*p].abs() > OUTSTANDING * sigma_rad) {
             let window = window(&even, &of_run, begin, QUIET * sigma_rad);
