@@ -11,6 +11,7 @@ use toml::{Table, Value};
 
 use super::lines::{Fault, Lines};
 use super::{BrakeProfile, CounterProfile, Limits, LogPolicy, Profile, ProfileError, Sequence, ServoProfile};
+use crate::calibration::Calibration;
 use crate::device::map::{Map, MapError};
 use crate::device::{self, MAP};
 use crate::link::Address;
@@ -120,6 +121,7 @@ impl Check {
                 }
                 Ok(()) => {
                     self.devices(&profile);
+                    self.calibration(&profile, path);
                     return;
                 }
             }
@@ -183,6 +185,14 @@ impl Check {
                 "current_limit_a",
                 &format!("= {} is beyond the last point of brake.rising, {last} A", brake.current_limit_a),
             );
+        }
+    }
+
+    /// The calibration is looked for beside the profile, as a run does.
+    fn calibration(&mut self, profile: &Profile, path: &Path) {
+        let Some(file) = &profile.calibration else { return };
+        if let Err(error) = Calibration::load(&path.parent().unwrap_or(Path::new("")).join(file)) {
+            self.fault("", "calibration", &error.to_string());
         }
     }
 
@@ -283,6 +293,13 @@ mod tests {
     fn encoders_that_cannot_serve_are_refused_with_the_reason() {
         let found = of(&SIM_PROFILE.replace("counter-box", "briter-rs485"));
         assert!(found.iter().any(|fault| fault.key == "counter.driver" && fault.what.contains("µrad")), "{found:?}");
+    }
+
+    #[test]
+    fn a_calibration_that_is_not_there_is_told() {
+        let found = of(&format!("calibration = \"no-such.toml\"\n{SIM_PROFILE}"));
+        assert!(found.len() == 1 && found[0].key == "calibration" && found[0].line == 1, "{found:?}");
+        assert!(found[0].what.contains("no-such.toml") && found[0].what.contains("rigd calibrate"), "{found:?}");
     }
 
     #[test]
