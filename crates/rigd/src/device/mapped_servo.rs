@@ -86,7 +86,7 @@ impl MappedServo {
                     continue;
                 }
             };
-            return Err(lacking(step.set.clone(), read, wanted.to_string(), self.port()));
+            return Err(lacking(self.device.called(&step.set), read, wanted.to_string(), self.port()));
         }
         Ok(())
     }
@@ -331,7 +331,7 @@ mod tests {
         for drive in [refusing, stuck] {
             let outcome = prepared("asda-b2", drive).await;
             assert!(
-                matches!(&outcome, Err(DeviceError::NoWatchdog { register, .. }) if register == "watchdog"),
+                matches!(&outcome, Err(DeviceError::NoWatchdog { register, .. }) if register == "watchdog P3-04"),
                 "{outcome:?}"
             );
         }

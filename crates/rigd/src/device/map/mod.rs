@@ -86,6 +86,9 @@ pub struct LineRules {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Register {
+    /// What the manual and the device's panel call it, say `P3-04`.
+    #[serde(default)]
+    pub label: String,
     /// First address.
     pub address: u16,
     /// How it stores its number.
@@ -481,6 +484,14 @@ impl Mapped {
         self.map
             .register(name, self.model.as_ref())
             .unwrap_or_else(|| RegisterDef::new("(not in the map)", 0, RegisterKind::U16, 1.0, "", Access::Read))
+    }
+
+    /// A register for a person: its name, with that of the manual where the map tells it.
+    pub fn called(&self, name: &str) -> String {
+        match self.map.registers.get(name) {
+            Some(register) if !register.label.is_empty() => format!("{name} {}", register.label),
+            _ => name.to_owned(),
+        }
     }
 
     pub async fn get(&mut self, name: &str) -> Result<f64, BusError> {

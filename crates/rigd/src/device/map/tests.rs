@@ -90,7 +90,7 @@ fn every_fault_is_told_at_once_with_its_line() {
     let wrong = good
         .replace("silence_ms = 10", "silence_ms = -1")
         .replace("speed_set = \"speed_1\"", "speed_set = \"speed_9\"")
-        .replace("ramp_up = { address = 0x0144, type = \"u16\"", "ramp_up = { address = 0x0144, type = \"u32\"")
+        .replace("address = 0x0144, type = \"u16\"", "address = 0x0144, type = \"u32\"")
         .replace("to = \"lease_s\"", "to = \"lease\"")
         .replace("{ set = \"fault_action\", to = 1 }", "{ set = \"fault_action\", to = 7 }");
     let faults = Map::parse(&wrong).expect_err("five faults");
