@@ -29,3 +29,26 @@ pictures:
 bench-cpu:
     cargo build --release -p rigd
     python3 scripts/bench_cpu.py
+
+# A million Modbus transactions a device with faults in simulated time; no value may be silently wrong.
+modbus-faults TRANSACTIONS="1000000":
+    cargo build --release -p rigd --example modbus_faults
+    for device in servo brake table; do target/release/examples/modbus_faults --device $device --transactions {{TRANSACTIONS}} || exit 1; done
+
+# The same over pseudo-terminals in real time, and against pymodbus's server (a quarter of an hour).
+modbus-faults-pty TRANSACTIONS="10000":
+    cargo build --release -p rigd --example modbus_faults
+    for device in servo brake; do target/release/examples/modbus_faults --device $device --over pty --transactions {{TRANSACTIONS}} || exit 1; done
+    target/release/examples/modbus_faults --device pymodbus --transactions {{TRANSACTIONS}}
+
+# Fuzzes every target for ten minutes at low priority (needs a nightly toolchain and cargo-fuzz); fuzz/run SECONDS TARGET... for less.
+fuzz SECONDS="600":
+    fuzz/run {{SECONDS}}
+
+# SIGKILL at 200 random instants of a run: at most 250 ms lost each time, every log opens, every next run goes on.
+kill-200:
+    cargo test --release -p rigd --test kill -- --ignored --nocapture
+
+# Eight simulated hours of a campaign with random faults: no leak, no loss unmarked, every run finished. HOURS and SEED may be given.
+soak HOURS="8" SEED="1":
+    RIG_HOURS={{HOURS}} RIG_SEED={{SEED}} cargo test --release -p rigd --test soak -- --ignored --nocapture

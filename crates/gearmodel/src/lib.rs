@@ -16,6 +16,7 @@
 //! model, exact) → [`loaded`]; [`recording`] → [`measure`] (the measurement) → [`effect`], [`gap`] (what stands between the
 //! two). The theory stands in [`theory`], page by page.
 
+pub mod calibration;
 pub mod contact;
 mod direction;
 pub mod effect;

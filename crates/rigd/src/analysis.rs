@@ -118,6 +118,17 @@ impl Analysis {
         self.backlash.last()
     }
 
+    /// Drops every run but the last at each sense, load and speed: a campaign of a night needs no more than backlash needs.
+    pub fn keep_last_of_each(&mut self) {
+        let mut kept: Vec<MeasuredRun> = Vec::new();
+        for run in std::mem::take(&mut self.runs) {
+            kept.retain(|earlier| earlier.te.conditions() != run.te.conditions());
+            kept.push(run);
+        }
+        self.runs = kept;
+        self.backlash.clear();
+    }
+
     /// Hash of every TE and backlash value so far, in order.
     #[must_use]
     pub fn te_hash(&self) -> String {

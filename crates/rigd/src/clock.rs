@@ -14,6 +14,7 @@ const SIMULATED_EPOCH_NS: u64 = 1_767_225_600_000_000_000;
 pub struct Clock {
     anchor_ns: u64,
     start: Instant,
+    simulated: bool,
 }
 
 impl Clock {
@@ -21,13 +22,25 @@ impl Clock {
     #[must_use]
     pub fn real() -> Self {
         let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Self { anchor_ns: since_epoch.as_nanos() as u64, start: Instant::now() }
+        Self { anchor_ns: since_epoch.as_nanos() as u64, start: Instant::now(), simulated: false }
     }
 
     /// Simulated time.
     #[must_use]
     pub fn simulated() -> Self {
-        Self { anchor_ns: SIMULATED_EPOCH_NS, start: Instant::now() }
+        Self::simulated_after(0)
+    }
+
+    /// Simulated time that goes on after `ns`: a campaign that is taken up again keeps one time for all its logs.
+    #[must_use]
+    pub fn simulated_after(ns: u64) -> Self {
+        Self { anchor_ns: SIMULATED_EPOCH_NS.max(ns), start: Instant::now(), simulated: true }
+    }
+
+    /// Time does not pass by itself.
+    #[must_use]
+    pub fn is_simulated(&self) -> bool {
+        self.simulated
     }
 
     /// Now, ns since the Unix epoch.

@@ -7,10 +7,13 @@
 
 pub mod analysis;
 pub mod blind;
+pub mod calibration;
+pub mod campaign;
 pub mod chart;
 pub mod cli;
 pub mod clock;
 pub mod device;
+pub mod doctor;
 pub mod gap;
 pub mod link;
 pub mod pair;
@@ -20,5 +23,6 @@ pub mod profile;
 pub mod quantity;
 pub mod replay;
 pub mod run;
+pub mod service;
 pub mod sim;
 pub mod summary;

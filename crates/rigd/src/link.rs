@@ -7,8 +7,8 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio_serial::{DataBits, Parity, SerialPort as _, SerialPortBuilderExt as _, SerialStream, StopBits};
 
 /// Anything that carries bytes both ways.
-pub trait Duplex: AsyncRead + AsyncWrite + Unpin {}
-impl<T: AsyncRead + AsyncWrite + Unpin> Duplex for T {}
+pub trait Duplex: AsyncRead + AsyncWrite + Unpin + Send {}
+impl<T: AsyncRead + AsyncWrite + Unpin + Send> Duplex for T {}
 
 /// A link to one device.
 pub type Link = Box<dyn Duplex>;
@@ -94,6 +94,14 @@ impl Address {
         // What an earlier master left in the buffers is no answer to us.
         port.clear(tokio_serial::ClearBuffer::All).map_err(|error| failed(error.into()))?;
         Ok(Box::new(port))
+    }
+
+    /// Whether the character format is one of ours.
+    ///
+    /// # Errors
+    /// [`LinkError::Format`].
+    pub fn check_format(&self) -> Result<(), LinkError> {
+        self.line_format().map(drop)
     }
 
     fn line_format(&self) -> Result<(DataBits, Parity, StopBits), LinkError> {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use gearmodel::NominalModel;
 use gearmodel::measure::RunConditions;
-use riglog::{LogError, RunSpan, RunStream, RunTotals, RunVisitor, SampleBlock};
+use riglog::{LogError, LogParts, RunSpan, RunStream, RunTotals, RunVisitor, SampleBlock};
 use thiserror::Error;
 
 use crate::analysis::Analysis;
@@ -122,7 +122,7 @@ impl Pace {
     }
 }
 
-/// Replays logs in their order into `analysis`; `speed` is a multiple of real time, `None` as fast as it goes.
+/// Replays logs in their order, the parts of a log that was split as one, into `analysis`; `speed` is a multiple of real time, `None` as fast as it goes.
 ///
 /// # Errors
 /// [`ReplayError`] names the log and what to do.
@@ -130,8 +130,9 @@ pub fn replay(paths: &[PathBuf], analysis: &mut Analysis, speed: Option<f64>) ->
     let mut replayed = Replayed::default();
     let pace = speed.map(|speed| Pace { began: Instant::now(), first_ns: None, speed });
     let mut feed = Feed { analysis, pace, last_ns: 0 };
-    for path in paths {
-        let totals = RunStream::open(path)?.stream(&mut feed)?;
+    for log in LogParts::group(paths)? {
+        let path = log.first().to_owned();
+        let totals = RunStream::open_parts(log)?.stream(&mut feed)?;
         let losses = totals.losses_in_file;
         replayed.losses += losses;
         if losses > 0 {

@@ -38,6 +38,9 @@ pub struct Summary {
     /// The picture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plot: Option<String>,
+    /// What happened on the lines of servo and brake; empty for a replay.
+    #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty")]
+    pub lines: BTreeMap<&'static str, crate::device::bus::BusStatistics>,
     /// How the run ended: `done`, or why not.
     pub ended: String,
     /// What one should know before believing the numbers.
@@ -221,6 +224,7 @@ impl Summary {
             runs,
             backlashes,
             plot: None,
+            lines: BTreeMap::new(),
             ended: origin.ended,
             warnings: origin.warnings,
         }
@@ -273,6 +277,9 @@ impl Summary {
         writeln!(out, "\nsamples {}   lost {}   recorded {:.1} s", self.samples, self.losses, self.duration_s)?;
         for log in &self.log {
             writeln!(out, "log     {log}")?;
+        }
+        for (device, line) in &self.lines {
+            writeln!(out, "{device:<7} {line}")?;
         }
         if let Some(plot) = &self.plot {
             writeln!(out, "plot    {plot}")?;

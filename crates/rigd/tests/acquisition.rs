@@ -7,6 +7,7 @@ use gearmodel::measure::RunConditions;
 use rigd::analysis::Analysis;
 use rigd::clock::Clock;
 use rigd::device::CounterIdentity;
+use rigd::profile::Profile;
 use rigd::run::acquire::Acquisition;
 use rigd::run::recorder::{Entry, Recorder};
 use rigd::{pair, replay};
@@ -67,12 +68,12 @@ fn record(
 ) -> (PathBuf, Analysis, u64, f64) {
     let (pair_toml, model) = pair::load(None).expect("the built-in pair");
     let path = directory.join("run.mcap");
-    let recorder = Recorder::create(&path, WriterOptions::new("test")).expect("a log");
+    let recorder = Recorder::create(&path, WriterOptions::new("test"), &Profile::simulated().log).expect("a log");
     recorder.write(0, 0, Entry::Attachment("pair.toml", "application/toml", pair_toml.into_bytes()));
     let mut acquisition = Acquisition::new(recorder, Clock::simulated(), Analysis::new(model.clone()));
     let identity =
         CounterIdentity { text: String::new(), counts_per_rev: [COUNTS; 2], lines: [18_000; 2], max_rate_hz: 1e6 };
-    acquisition.set_encoders(&identity, [1, 1]);
+    acquisition.set_encoders(&identity, [1, 1], "none").expect("the first encoders");
     let mut source = Source {
         analysis: Analysis::new(model),
         sample: 0,

@@ -64,9 +64,9 @@ fn a_file_size_limit_stops_the_rig_in_order() {
 struct SmallDisk<'a>(&'a Path);
 
 impl<'a> SmallDisk<'a> {
-    fn mount(at: &'a Path) -> Option<Self> {
+    fn mount(at: &'a Path, room_kib: u32) -> Option<Self> {
         std::fs::create_dir_all(at).expect("a directory");
-        let size = format!("size={ROOM_KIB}k");
+        let size = format!("size={room_kib}k");
         let mounted = Command::new("mount").args(["-t", "tmpfs", "-o", &size, "tmpfs"]).arg(at).status();
         mounted.is_ok_and(|status| status.success()).then_some(Self(at))
     }
@@ -82,12 +82,13 @@ impl Drop for SmallDisk<'_> {
 fn a_full_disk_stops_the_rig_in_order() {
     let directory = tempfile::TempDir::new().expect("a temporary directory");
     let at = directory.path().join("small");
-    let Some(disk) = SmallDisk::mount(&at) else {
+    let Some(disk) = SmallDisk::mount(&at, ROOM_KIB) else {
         println!("skipped: this user may not mount a tmpfs; the test of the file size limit stands in");
         return;
     };
     let sim = Sim::start(2);
-    let profile = sim.profile(|_| {});
+    // Without the watch, which would not let a run begin here.
+    let profile = sim.profile(|profile| profile.log.stop_free_mb = 0.0);
     let mut run = Run::through(|home, _| {
         let mut command = rigd(home);
         command.args(arguments(&profile)).arg("--out").arg(&at);
@@ -97,7 +98,7 @@ fn a_full_disk_stops_the_rig_in_order() {
     let ended = run.wait(60.0);
     check("full disk", &sim, &run, &ended, &["No space left on device", "free space"]);
     // With room again, the next run finalises what is there and measures.
-    let enlarged = Command::new("mount").args(["-o", "remount,size=64m"]).arg(&at).status();
+    let enlarged = Command::new("mount").args(["-o", "remount,size=4g"]).arg(&at).status();
     assert!(enlarged.is_ok_and(|status| status.success()));
     let next = rigd(run.home())
         .args("run --load 5Nm --rpm 30 --revs 1 --direction ccw --rate 1kHz --json --out".split(' '))
@@ -106,5 +107,34 @@ fn a_full_disk_stops_the_rig_in_order() {
         .expect("it runs");
     assert_eq!(next.status.code(), Some(0), "{}", String::from_utf8_lossy(&next.stderr));
     run.assert_whole();
+    drop(disk);
+}
+
+#[test]
+fn a_disk_that_runs_short_stops_the_rig_while_the_log_can_still_be_ended() {
+    let directory = tempfile::TempDir::new().expect("a temporary directory");
+    let at = directory.path().join("small");
+    let Some(disk) = SmallDisk::mount(&at, 4 * ROOM_KIB) else {
+        println!("skipped: this user may not mount a tmpfs");
+        return;
+    };
+    let sim = Sim::start(3);
+    let profile = sim.profile(|profile| (profile.log.warn_free_mb, profile.log.stop_free_mb) = (0.9, 0.8));
+    let mut run = Run::through(|home, _| {
+        let mut command = rigd(home);
+        command.args(arguments(&profile)).arg("--out").arg(&at);
+        command
+    });
+    run.out = at.clone();
+    let ended = run.wait(60.0);
+    println!("short of room: exit {:?} after {:.1} s: {}", ended.code, ended.seconds, ended.stderr.trim());
+    let state = sim.servo().state();
+    assert_eq!(ended.code, Some(5), "{}", ended.stderr);
+    assert!(ended.stderr.contains("log.stop_free_mb"), "{}", ended.stderr);
+    assert!(!state.on && state.motor_rpm.abs() < 1.0 && state.alarm == 0, "{state:?}");
+    // Unlike that of a full disk, this log has its end and lacks nothing.
+    let log = run.log().expect("a log");
+    let audit = riglog::audit(&riglog::LogParts::of(&log).expect("a log")).expect("a readable log");
+    assert!(audit.is_clean() && audit.samples > 10_000, "{:?}", audit.findings);
     drop(disk);
 }

@@ -6,6 +6,8 @@ mod support;
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use rand::{Rng as _, SeedableRng as _};
+use rand_pcg::Pcg64Mcg;
 use rigd::device::COUNTERS;
 use rigd::link::Address;
 use rigd::profile::Profile;
@@ -60,9 +62,10 @@ struct Left {
     short_ms: Option<f64>,
 }
 
-fn kill_at(instant: Instance, seed: u64) -> Left {
-    let seed = seed.to_string();
-    let mut run = Run::start(&["--time-scale", "1", "--direction", "ccw", "--revs", "2", "--seed", &seed]);
+fn kill_at(instant: Instance, revolutions: &str, seed: u64) -> Left {
+    assert!(seed < 10_000, "{instant:?}: the run ends by itself again and again");
+    let number = seed.to_string();
+    let mut run = Run::start(&["--time-scale", "1", "--direction", "ccw", "--revs", revolutions, "--seed", &number]);
     if instant.phase == Phase::Idle {
         wait_for("the log", 30.0, || run.log());
     } else {
@@ -70,7 +73,13 @@ fn kill_at(instant: Instance, seed: u64) -> Left {
     }
     std::thread::sleep(Duration::from_millis(instant.after_ms));
     let simulators = children(run.process.pid());
-    assert_eq!(simulators.len(), 1, "the simulated rig is a process of its own");
+    let said = std::fs::read_to_string(run.home().join("stderr")).unwrap_or_default();
+    if simulators.is_empty() && run.process.ended() {
+        // Real time on a computer with no time to spare: the rig did not answer, and the run ended by itself, in order.
+        println!("{instant:?}: once more, for the run had ended before: {said}");
+        return kill_at(instant, revolutions, seed + 1000);
+    }
+    assert_eq!(simulators.len(), 1, "the simulated rig is a process of its own; {instant:?}: {said}");
     let killed = SystemTime::now();
     run.process.signal(nix::sys::signal::Signal::SIGKILL);
     run.process.wait(5.0);
@@ -79,20 +88,24 @@ fn kill_at(instant: Instance, seed: u64) -> Left {
     let log = run.log().expect("a log");
     let mut messages = 0;
     let mut last_sample_ns = None;
-    let mut next = None;
+    let mut next: Option<u64> = None;
+    let mut told = String::new();
     for record in LogReader::open(&log).expect("a readable log") {
         match record.expect("whole records") {
             Record::Angles { log_time_ns, batch, .. } => {
-                assert!(
-                    next.is_none_or(|next| next == batch.first_sample),
-                    "a gap before sample {}",
-                    batch.first_sample
-                );
+                // On a crowded computer the line itself may lose samples; the log then says so before it goes on.
+                let first = batch.first_sample;
+                let gap = next.filter(|next| *next != first).map(|next| format!("samples {next} to {} ", first - 1));
+                assert!(gap.is_none_or(|gap| told.contains(&gap)), "a gap before sample {first} that nobody told");
                 next = Some(batch.first_sample + batch.input_delta.len() as u64);
                 last_sample_ns = Some(log_time_ns);
                 messages += 1;
             }
-            Record::State { .. } | Record::Te { .. } | Record::Backlash { .. } | Record::Event { .. } => messages += 1,
+            Record::Event { event, .. } => {
+                told.push_str(&event.message);
+                messages += 1;
+            }
+            Record::State { .. } | Record::Te { .. } | Record::Backlash { .. } => messages += 1,
             _ => {}
         }
     }
@@ -101,20 +114,51 @@ fn kill_at(instant: Instance, seed: u64) -> Left {
     Left { instant, run, log, messages, short_ms }
 }
 
-#[test]
-fn a_run_killed_at_20_instants_leaves_a_clean_prefix_that_the_next_run_finalises() {
+/// Kills runs, a few at a time, and gives what they left.
+fn kill_all(rounds: &[&[Instance]], revolutions: &'static str) -> Vec<Left> {
     let mut all = Vec::new();
-    for (round, instants) in INSTANTS.iter().enumerate() {
+    for instants in rounds {
+        let first = all.len();
         let threads: Vec<_> = instants
             .iter()
             .enumerate()
             .map(|(n, instant)| {
                 let instant = *instant;
-                std::thread::spawn(move || kill_at(instant, (5 * round + n) as u64))
+                std::thread::spawn(move || kill_at(instant, revolutions, (first + n) as u64))
             })
             .collect();
         all.extend(threads.into_iter().map(|thread| thread.join().expect("the case holds")));
     }
+    all
+}
+
+#[test]
+fn a_run_killed_at_20_instants_leaves_a_clean_prefix_that_the_next_run_finalises() {
+    check(&kill_all(&INSTANTS.each_ref().map(|round| round.as_slice()), "2"));
+}
+
+/// `just kill-200`: at random instants of the first 18 s, from connecting through homing into the recording.
+#[test]
+#[ignore = "takes minutes; `just kill-200`"]
+fn a_run_killed_at_200_random_instants() {
+    let seed = std::env::var("RIG_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(1);
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let mut instants: Vec<_> = (0..200).map(|_| at(Phase::Idle, random.next_u64() % 18_000)).collect();
+    // Those of one round last alike.
+    instants.sort_by_key(|instant| instant.after_ms);
+    let all = kill_all(&instants.chunks(4).collect::<Vec<_>>(), "20");
+    let worst_ms = all.iter().filter_map(|left| left.short_ms).fold(0.0, f64::max);
+    let recording = all.iter().filter(|left| left.messages > 0).count();
+    check(&all);
+    println!(
+        "seed {seed}: {} kills, {recording} of them with messages in the log; the worst lost {worst_ms:.0} ms; every log opened, \
+         every next run went on and finalised it",
+        all.len()
+    );
+}
+
+/// What must be so after every kill, and once the next run has been there.
+fn check(all: &[Left]) {
     let logs: Vec<_> = all.iter().map(|left| left.log.clone()).collect();
     let by_python = python_counts("stream", &logs);
     for (n, left) in all.iter().enumerate() {
@@ -127,7 +171,7 @@ fn a_run_killed_at_20_instants_leaves_a_clean_prefix_that_the_next_run_finalises
         }
     }
 
-    for left in &all {
+    for left in all {
         let next = rigd(left.run.home())
             .args("run --load 5Nm --rpm 30 --revs 1 --direction ccw --rate 1kHz --json --out".split(' '))
             .arg(&left.run.out)

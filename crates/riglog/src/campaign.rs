@@ -1,7 +1,6 @@
 //! Logs of one campaign as points for the gap diagnosis, on one clock: no more of them is held than a few batches.
 
 use std::{
-    collections::BTreeSet,
     ops::ControlFlow,
     path::{Path, PathBuf},
     sync::{
@@ -25,6 +24,7 @@ use gearmodel::{
 use crate::{
     error::LogError,
     metadata::EncoderMetadata,
+    parts::LogParts,
     run_stream::{RunStream, RunVisitor, SampleBlock, StreamTotals},
     runs::{RunSpan, RunTotals},
 };
@@ -68,21 +68,15 @@ impl ReducedLogs {
 }
 
 impl CampaignLogs {
-    /// Looks for the runs of every log. A log that is named twice counts once.
+    /// Looks for the runs of every log. A log that is named twice counts once, as do the parts of a log that was split.
     ///
     /// # Errors
     /// [`LogError`] as from [`RunStream::open`].
     pub fn open(paths: &[impl AsRef<Path>]) -> Result<Self, LogError> {
-        let mut seen = BTreeSet::new();
-        let paths: Vec<PathBuf> = paths
-            .iter()
-            .map(|path| path.as_ref().to_owned())
-            // A path that cannot be resolved cannot be opened either, and says so there.
-            .filter(|path| seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone())))
-            .collect();
+        let sets = LogParts::group(paths)?;
         let mut logs = Vec::new();
-        for (path, stream) in paths.iter().zip(on_all_cores(&paths, |path| RunStream::open(path))) {
-            logs.push((path.clone(), stream?));
+        for (set, stream) in sets.iter().zip(on_all_cores(&sets, |set| RunStream::open_parts(set.clone()))) {
+            logs.push((set.first().to_owned(), stream?));
         }
         // Equal times: by name, so that the order in which they were named never matters.
         logs.sort_by(|(a, one), (b, other)| (one.start_ns(), a).cmp(&(other.start_ns(), b)));

@@ -31,6 +31,19 @@ impl Completeness {
         matches!(self, Self::Complete)
     }
 
+    /// Adds what was found in another part of the log; the first fault of the worst kind is kept.
+    pub(crate) fn add(&mut self, other: Self) {
+        match (&*self, &other) {
+            (_, Self::Complete) | (Self::Damaged { .. }, Self::Truncated { .. }) => {}
+            (Self::Truncated { .. }, Self::Truncated { .. }) => {}
+            (Self::Damaged { at_byte, why, places }, Self::Damaged { places: more, .. }) => {
+                let places = places.saturating_add(*more);
+                *self = Self::Damaged { at_byte: *at_byte, why: why.clone(), places };
+            }
+            _ => *self = other,
+        }
+    }
+
     /// Adds a place where bytes are wrong; damage outweighs truncation, the first place is kept.
     pub(crate) fn add_damage(&mut self, place: u64, defect: Defect) {
         match self {
@@ -142,6 +155,12 @@ pub enum Defect {
     Trailing {
         /// How many.
         bytes: u64,
+    },
+    /// A part of a log that was split is not there.
+    #[error("part {part} of the log is missing; put it beside the others")]
+    MissingPart {
+        /// Its number, from 1.
+        part: u32,
     },
     /// The summary and the data disagree.
     #[error("the summary counts {stated} messages, the data holds {found}")]

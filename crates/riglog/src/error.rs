@@ -69,6 +69,17 @@ pub enum LogError {
         /// What the operating system answered.
         source: io::Error,
     },
+    /// The disk is nearly full: the run ends while there is room for the end of its log.
+    #[error("only {:.1} MB are free in {} (limit {:.1} MB, log.stop_free_mb); what was recorded is kept and ended in order: free space, or record elsewhere with --out",
+        *free_bytes as f64 * 1e-6, directory.display(), *limit_bytes as f64 * 1e-6)]
+    DiskShort {
+        /// The log's directory.
+        directory: PathBuf,
+        /// What is free.
+        free_bytes: u64,
+        /// What shall be.
+        limit_bytes: u64,
+    },
     /// The file is something else.
     #[error("{} is not an MCAP file: it begins with {found}; give a log written by `rigd run` or `rigd import`", path.display())]
     NotMcap {

@@ -58,9 +58,11 @@ pub struct RunInfo {
 /// What is in a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogInfo {
-    /// The file.
+    /// The file; the first one of a log that was split.
     pub path: PathBuf,
-    /// Its size.
+    /// All files of the log, in order.
+    pub parts: Vec<PathBuf>,
+    /// Their size.
     pub bytes: u64,
     /// The program that wrote it.
     pub library: String,
@@ -95,7 +97,6 @@ pub struct LogInfo {
 /// # Errors
 /// The file is no rig log, or a record in it makes no sense.
 pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
-    let path = path.as_ref();
     let stream = RunStream::open(path)?;
     let totals = stream.count()?;
     let survey = stream.survey();
@@ -114,7 +115,8 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
         .collect();
     const S_PER_NS: f64 = 1e-9;
     Ok(LogInfo {
-        path: path.to_owned(),
+        path: stream.parts().first().to_owned(),
+        parts: stream.parts().paths().map(Path::to_owned).collect(),
         bytes: survey.bytes,
         library: survey.library.clone(),
         metadata: survey.metadata.clone(),

@@ -2,18 +2,23 @@
 //!
 //! - [`LogWriter`] writes a log so that a killed process, a full disk or a power cut leaves a clean prefix of it.
 //! - [`LogReader`] reads any log in file order, whole or cut off, a chunk at a time, and says whether it is whole.
+//! - [`RotatingWriter`] splits a long log into parts without losing a sample; [`LogParts`] finds the parts of one log.
+//! - [`audit()`] checks checksums, sequence and clock; [`Follower`] reads a log that is being written.
 //! - [`recover()`] finalises what a killed writer left.
 //! - [`info()`] says what is in a log; [`RunStream`] and [`read_runs`] give its runs as shaft angles, [`CampaignLogs`] those of
 //!   several logs as points for the gap diagnosis.
 //!
 //! Messages and their units are those of `proto/rig.proto`; times are ns since the Unix epoch.
 
+mod audit;
 mod batch;
 mod campaign;
 mod completeness;
 mod error;
+mod follow;
 mod info;
 mod metadata;
+mod parts;
 pub mod proto;
 mod reader;
 mod record;
@@ -25,15 +30,18 @@ mod topic;
 mod walk;
 mod write;
 
+pub use audit::{Audit, Finding, FindingKind, audit};
 pub use batch::BatchBuilder;
 pub use campaign::{CampaignLogs, ReducedLogs};
 pub use completeness::{Completeness, Defect};
 pub use error::{BatchError, LogError};
+pub use follow::{Follower, Following};
 pub use info::{AttachmentInfo, ChannelInfo, LogInfo, RunInfo, info};
 pub use metadata::{AngleScale, EncoderMetadata, MetadataMap, RunMetadata};
+pub use parts::{LogParts, PartMetadata, part_path};
 pub use reader::{LogReader, Record};
 pub use recover::{RecoveredFile, Recovery, recover, recover_directory};
 pub use run_stream::{RunStream, RunVisitor, SampleBlock, StreamTotals};
 pub use runs::{RecordedRun, RunSpan, RunTotals, read_runs};
 pub use topic::Topic;
-pub use write::{LogStatistics, LogWriter, WriterOptions};
+pub use write::{LogStatistics, LogWriter, RotatingWriter, Rotation, WriterOptions};

@@ -195,7 +195,7 @@ pub(crate) fn bad_message(
     LogError::BadMessage { path: path.to_owned(), topic, schema, log_time_ns, at_byte, source }
 }
 
-fn decode(event: Event<'_>, path: &Path) -> Result<Record, LogError> {
+pub(crate) fn decode(event: Event<'_>, path: &Path) -> Result<Record, LogError> {
     let (at_byte, topic, channel, message) = match event {
         Event::Message { chunk_at, topic, channel, message, .. } => (chunk_at, topic, channel, message),
         Event::Metadata { name, map } => return metadata(name, map),

@@ -2,10 +2,7 @@
 
 mod streaming;
 
-use std::{
-    ops::ControlFlow,
-    path::{Path, PathBuf},
-};
+use std::{fs::File, io::BufReader, ops::ControlFlow, path::Path};
 
 use prost::Message;
 
@@ -14,6 +11,7 @@ use crate::{
     completeness::Completeness,
     error::LogError,
     metadata::{EncoderMetadata, RunMetadata},
+    parts::LogParts,
     proto::AngleBatch,
     reader::{bad_message, open},
     runs::{RunSpan, RunTotals},
@@ -91,19 +89,32 @@ impl StreamTotals {
 /// A log whose runs are known and can be streamed, as often as wanted.
 #[derive(Debug, Clone)]
 pub struct RunStream {
-    path: PathBuf,
+    parts: LogParts,
     survey: Survey,
 }
 
 impl RunStream {
-    /// Walks over the log once to learn its runs, wherever their states stand among the samples.
+    /// Walks over the log once to learn its runs, wherever their states stand among the samples. A part of a log that was split
+    /// brings the others beside it along.
     ///
     /// # Errors
     /// The file is no rig log, or a state or an encoder record in it makes no sense.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, LogError> {
-        let path = path.as_ref().to_owned();
-        let survey = survey(&path)?;
-        Ok(Self { path, survey })
+        Self::open_parts(LogParts::of(path)?)
+    }
+
+    /// As [`RunStream::open`], of files that are known to belong together.
+    ///
+    /// # Errors
+    /// As [`RunStream::open`].
+    pub fn open_parts(parts: LogParts) -> Result<Self, LogError> {
+        let survey = survey(&parts)?;
+        Ok(Self { parts, survey })
+    }
+
+    /// The files of the log.
+    pub fn parts(&self) -> &LogParts {
+        &self.parts
     }
 
     /// The runs, in order of time.
@@ -148,7 +159,7 @@ impl RunStream {
         match self.survey.encoders {
             Some(encoders) => self.drive(&encoders, visitor),
             None if self.survey.spans.is_empty() => self.drive(&NO_ENCODERS, visitor),
-            None => Err(LogError::NoEncoders { path: self.path.clone() }),
+            None => Err(LogError::NoEncoders { path: self.parts.first().to_owned() }),
         }
     }
 
@@ -164,23 +175,46 @@ impl RunStream {
     }
 
     fn drive(&self, encoders: &EncoderMetadata, visitor: &mut impl RunVisitor) -> Result<StreamTotals, LogError> {
-        let (source, bytes) = open(&self.path)?;
-        let mut walk = Walk::new(source, bytes, &self.path)?;
         let mut state = Streaming::new(&self.survey.spans, encoders, visitor);
         let mut batch = AngleBatch::default();
-        let mut flow = ControlFlow::Continue(());
-        while flow.is_continue() {
+        let mut completeness = Completeness::Complete;
+        for path in self.parts.paths() {
+            let (source, bytes) = open(path)?;
+            let mut walk = Walk::new(source, bytes, path)?;
+            if self.drive_part(&mut walk, path, &mut state, &mut batch)?.is_break() {
+                return Ok(state.finish(self.survey.completeness.clone()));
+            }
+            completeness.add(walk.completeness().cloned().unwrap_or(Completeness::Complete));
+        }
+        let _ = state.end_run();
+        // A log that is still being written may have grown; what it lacks besides, the survey knows.
+        if completeness.is_complete() {
+            completeness = self.survey.completeness.clone();
+        }
+        Ok(state.finish(completeness))
+    }
+
+    fn drive_part(
+        &self,
+        walk: &mut Walk<BufReader<File>>,
+        path: &Path,
+        state: &mut Streaming<'_, impl RunVisitor>,
+        batch: &mut AngleBatch,
+    ) -> Result<ControlFlow<()>, LogError> {
+        loop {
             match walk.next()? {
-                None => break,
+                None => return Ok(ControlFlow::Continue(())),
                 Some(Event::Message { chunk_at, topic: Some(topic @ Topic::Angles), message, .. }) => {
                     // Cleared, the vectors keep their memory from batch to batch.
                     batch.clear();
                     batch
                         .merge(message.data)
-                        .map_err(|source| bad_message(&self.path, topic, message.log_time_ns, chunk_at, source))?;
+                        .map_err(|source| bad_message(path, topic, message.log_time_ns, chunk_at, source))?;
                     batch.validate()?;
-                    state.check_time(&batch, &self.path)?;
-                    flow = state.batch(&batch);
+                    state.check_time(batch, path)?;
+                    if state.batch(batch).is_break() {
+                        return Ok(ControlFlow::Break(()));
+                    }
                 }
                 Some(Event::Metadata { name, map }) if name == EncoderMetadata::NAME => {
                     state.use_encoders(&EncoderMetadata::from_map(&map)?);
@@ -188,11 +222,6 @@ impl RunStream {
                 Some(_) => {}
             }
         }
-        if flow.is_continue() {
-            let _ = state.end_run();
-        }
-        let completeness = walk.completeness().unwrap_or(&self.survey.completeness).clone();
-        Ok(state.finish(completeness))
     }
 }
 

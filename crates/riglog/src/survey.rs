@@ -9,6 +9,7 @@ use crate::{
     error::LogError,
     info::{AttachmentInfo, ChannelInfo},
     metadata::{EncoderMetadata, MetadataMap, RunMetadata},
+    parts::{LogParts, PartMetadata},
     proto::{AngleBatch, RigState},
     reader::{bad_message, check_channels, open},
     runs::{RunSpan, spans},
@@ -37,13 +38,11 @@ pub(crate) struct Survey {
     pub(crate) completeness: Completeness,
 }
 
-pub(crate) fn survey(path: &Path) -> Result<Survey, LogError> {
-    let (source, bytes) = open(path)?;
-    check_channels(Walk::new(source, bytes, path)?)?;
-    let mut walk = Walk::new(open(path)?.0, bytes, path)?;
+/// Walks over all parts of a log.
+pub(crate) fn survey(parts: &LogParts) -> Result<Survey, LogError> {
     let mut states = Vec::new();
     let mut survey = Survey {
-        bytes,
+        bytes: 0,
         library: String::new(),
         metadata: BTreeMap::new(),
         run: None,
@@ -55,59 +54,98 @@ pub(crate) fn survey(path: &Path) -> Result<Survey, LogError> {
         bounds_ns: None,
         completeness: Completeness::Complete,
     };
-    while let Some(event) = walk.next()? {
-        match event {
-            Event::Message { chunk_at, topic, message, .. } => {
-                let (log, data) = (message.log_time_ns, message.data);
-                let (first, last) = survey.bounds_ns.unwrap_or((log, log));
-                survey.bounds_ns = Some((first.min(log), last.max(log)));
-                match topic {
-                    Some(topic @ Topic::State) => {
-                        let state =
-                            RigState::decode(data).map_err(|source| bad_message(path, topic, log, chunk_at, source))?;
-                        // A program that leaves the time stamp out gives it as the publish time.
-                        let at_ns = state.timestamp.as_ref().and_then(|t| t.as_ns());
-                        states.push((at_ns.unwrap_or(message.publish_time_ns), state));
+    let mut continued = false;
+    for path in parts.paths() {
+        continued = survey.part(path, &mut states)?;
+    }
+    if let Some(why) = parts.missing(continued) {
+        survey.completeness.add(Completeness::Truncated { at_byte: 0, why });
+    }
+    survey.spans = spans(states, parts.first())?;
+    Ok(survey)
+}
+
+impl Survey {
+    /// Walks over one part; says whether another follows it.
+    fn part(&mut self, path: &Path, states: &mut Vec<(u64, RigState)>) -> Result<bool, LogError> {
+        let survey = self;
+        let (source, bytes) = open(path)?;
+        check_channels(Walk::new(source, bytes, path)?)?;
+        let mut walk = Walk::new(open(path)?.0, bytes, path)?;
+        survey.bytes += bytes;
+        let (mut continued, mut first_state, mut carried_over) = (false, true, 0);
+        while let Some(event) = walk.next()? {
+            match event {
+                Event::Message { chunk_at, topic, message, .. } => {
+                    let (log, data) = (message.log_time_ns, message.data);
+                    let (first, last) = survey.bounds_ns.unwrap_or((log, log));
+                    survey.bounds_ns = Some((first.min(log), last.max(log)));
+                    match topic {
+                        Some(topic @ Topic::State) => {
+                            let state = RigState::decode(data)
+                                .map_err(|source| bad_message(path, topic, log, chunk_at, source))?;
+                            // A program that leaves the time stamp out gives it as the publish time.
+                            let at_ns = state.timestamp.as_ref().and_then(|t| t.as_ns());
+                            let state = (at_ns.unwrap_or(message.publish_time_ns), state);
+                            // A part begins with the state that holds: a repetition of the last one before it.
+                            if std::mem::take(&mut first_state) && states.last() == Some(&state) {
+                                carried_over += 1;
+                            } else {
+                                states.push(state);
+                            }
+                        }
+                        Some(topic @ Topic::Angles) if survey.first_sample_ns.is_none() => {
+                            let batch = AngleBatch::decode(data)
+                                .map_err(|source| bad_message(path, topic, log, chunk_at, source))?;
+                            survey.first_sample_ns = (!batch.is_empty()).then_some(batch.t0_ns);
+                        }
+                        _ => {}
                     }
-                    Some(topic @ Topic::Angles) if survey.first_sample_ns.is_none() => {
-                        let batch = AngleBatch::decode(data)
-                            .map_err(|source| bad_message(path, topic, log, chunk_at, source))?;
-                        survey.first_sample_ns = (!batch.is_empty()).then_some(batch.t0_ns);
-                    }
-                    _ => {}
                 }
-            }
-            Event::Metadata { name, map } => {
-                match name.as_str() {
-                    RunMetadata::NAME => survey.run = Some(RunMetadata::from_map(&map)),
-                    // The first homing holds until a later record says otherwise.
-                    EncoderMetadata::NAME if survey.encoders.is_none() => {
-                        survey.encoders = Some(EncoderMetadata::from_map(&map)?);
+                Event::Metadata { name, map } => {
+                    match name.as_str() {
+                        RunMetadata::NAME => survey.run = Some(RunMetadata::from_map(&map)),
+                        // The first homing holds until a later record says otherwise.
+                        EncoderMetadata::NAME if survey.encoders.is_none() => {
+                            survey.encoders = Some(EncoderMetadata::from_map(&map)?);
+                        }
+                        PartMetadata::CONTINUED => continued = true,
+                        _ => {}
                     }
-                    _ => {}
+                    survey.metadata.insert(name, map);
                 }
-                survey.metadata.insert(name, map);
-            }
-            Event::Attachment { header, data } => {
-                let (name, media_type) = (header.name, header.media_type);
-                let bytes = data.len() as u64;
-                let kept = (data.len() <= KEPT_ATTACHMENT_BYTES).then(|| data.to_vec());
-                survey.attachments.push(AttachmentInfo { name, media_type, bytes, data: kept });
+                Event::Attachment { header, data } => {
+                    let (name, media_type) = (header.name, header.media_type);
+                    // Every part carries the same files.
+                    if survey.attachments.iter().any(|known| known.name == name && known.data.as_deref() == Some(data))
+                    {
+                        continue;
+                    }
+                    let bytes = data.len() as u64;
+                    let kept = (data.len() <= KEPT_ATTACHMENT_BYTES).then(|| data.to_vec());
+                    survey.attachments.push(AttachmentInfo { name, media_type, bytes, data: kept });
+                }
             }
         }
+        if survey.library.is_empty() {
+            survey.library = walk.library().to_owned();
+        }
+        for channel in walk.channels() {
+            let repeated = if channel.topic == Some(Topic::State) { carried_over } else { 0 };
+            let messages = channel.messages.saturating_sub(repeated);
+            match survey.channels.iter_mut().find(|known| known.topic == channel.name && known.schema == channel.schema)
+            {
+                Some(known) => known.messages += messages,
+                None => survey.channels.push(ChannelInfo {
+                    topic: channel.name.clone(),
+                    schema: channel.schema.clone(),
+                    messages,
+                }),
+            }
+        }
+        if let Some(completeness) = walk.completeness() {
+            survey.completeness.add(completeness.clone());
+        }
+        Ok(continued)
     }
-    survey.library = walk.library().to_owned();
-    survey.channels = walk
-        .channels()
-        .map(|channel| ChannelInfo {
-            topic: channel.name.clone(),
-            schema: channel.schema.clone(),
-            messages: channel.messages,
-        })
-        .collect();
-    if let Some(completeness) = walk.completeness() {
-        survey.completeness = completeness.clone();
-    }
-    survey.spans = spans(states, path)?;
-    Ok(survey)
 }

@@ -254,6 +254,17 @@ impl<R: Read + Seek> Walk<R> {
         Ok(())
     }
 
+    /// Goes on behind the last whole record of a file that has grown to `file_bytes` since.
+    pub(crate) fn resume(&mut self, file_bytes: u64) -> Result<(), LogError> {
+        if self.section == Section::Over && !self.has_end {
+            self.section = Section::Data;
+            self.completeness = Completeness::Complete;
+            self.records.grow(file_bytes);
+            self.restart(self.data_end_at)?;
+        }
+        Ok(())
+    }
+
     fn restart(&mut self, at: u64) -> Result<(), LogError> {
         self.records.restart(at).map_err(LogError::io("read", &self.path))
     }

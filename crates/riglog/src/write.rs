@@ -3,6 +3,7 @@
 pub(crate) mod encoder;
 mod options;
 mod output;
+mod rotate;
 mod store;
 mod sync;
 mod writer;
@@ -10,4 +11,5 @@ mod writer;
 pub(crate) use writer::sync_directory_of;
 
 pub use options::{LogStatistics, WriterOptions};
+pub use rotate::{RotatingWriter, Rotation};
 pub use writer::LogWriter;

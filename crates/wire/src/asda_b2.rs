@@ -128,6 +128,8 @@ pub const FAULT_CONTINUE: u16 = 0;
 pub const FAULT_STOP: u16 = 1;
 /// Highest [`Alarm`] code that P0-01 shows for the communication watchdog.
 pub const ALARM_COMMUNICATION_TIMEOUT: u16 = 0x0020;
+/// Alarm of P0-01: the emergency stop input is open.
+pub const ALARM_EMERGENCY_STOP: u16 = 0x0013;
 
 /// Codes for P0-17 to P0-21 and P0-45 (2018, p. 7-106).
 pub mod monitor {

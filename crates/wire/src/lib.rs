@@ -10,12 +10,16 @@
 //! | [`register_map`] | registers as data: address, type, word order, scale, unit | |
 //! | [`asda_b2`] | Delta ASDA-B2 servo drive | `docs/wire/asda-b2.md` |
 //! | [`rd60xx`] | Riden RD60xx current source, the brake's driver | `docs/wire/rd60xx.md` |
+//! | [`dsp7000`] | Magtrol DSP7000 dynamometer controller | `docs/wire/dsp7000.md` |
+//! | [`qsb`] | US Digital QSB encoder readers | `docs/wire/qsb.md` |
 //! | [`counter_box`] | the rig's own two-channel counter box | `docs/wire/counter-box.md` |
 
 pub mod asda_b2;
 pub mod counter_box;
+pub mod dsp7000;
 mod hex;
 pub mod modbus;
+pub mod qsb;
 pub mod rd60xx;
 pub mod register_map;
 

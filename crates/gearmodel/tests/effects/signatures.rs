@@ -63,7 +63,7 @@ fn sampled(rig: &Rig) -> Vec<(&'static str, Vec<f64>, Vec<f64>)> {
             "pitch_curve_error" => shapes.retain(|s| s[..] == [0.0]),
             "encoder1_interpolation" | "encoder2_interpolation" => shapes = vec![vec![1.0, 30.0]],
             "torsional_resonance" => {
-                shapes = vec![vec![1.0, 120.0, 1e-4, 1.0], vec![0.0, 5.0, 1e-4, 3.0], vec![2.0, 50.0, 0.05]]
+                shapes = vec![vec![1.0, 120.0, 1e-4, 1.0], vec![0.0, 5.0, 1e-4, 3.0], vec![2.0, 50.0, 0.05]];
             }
             "slip" | "wear_drift" | "count_loss" => shapes.clear(),
             _ => {}

@@ -12,7 +12,7 @@ use crate::summary::name;
 /// Say what is in a log.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The log
+    /// The log; of one that was split, any part
     #[arg(value_name = "LOG")]
     log: PathBuf,
     /// One JSON object on stdout, nothing else
@@ -41,6 +41,7 @@ fn json(info: &LogInfo) -> Value {
     json!({
         "schema": "rigd.info/1",
         "log": info.path.display().to_string(),
+        "parts": info.parts.iter().map(|part| part.display().to_string()).collect::<Vec<_>>(),
         "bytes": info.bytes,
         "library": info.library,
         "metadata": info.metadata,
@@ -79,6 +80,10 @@ fn write_text(info: &LogInfo, out: &mut String) -> std::fmt::Result {
         info.duration_s,
         info.library
     )?;
+    if info.parts.len() > 1 {
+        let names = info.parts.iter().filter_map(|part| part.file_name()).map(|name| name.to_string_lossy());
+        writeln!(out, "{} parts: {}", info.parts.len(), names.collect::<Vec<_>>().join(", "))?;
+    }
     writeln!(out, "{}", info.completeness)?;
     for (record, entries) in &info.metadata {
         writeln!(out, "\n{record}")?;

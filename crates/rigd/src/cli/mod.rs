@@ -1,17 +1,26 @@
 //! The command line. One command is one file; here they are only routed.
 
 mod analyse;
+mod audit;
 mod blindtest;
+mod calibrate;
+mod campaign;
 mod diagnose;
 mod directions;
+mod doctor;
+mod export;
 mod import;
 mod info;
 mod model;
+mod profile;
+mod prune;
+mod recover;
 mod replay;
 mod run;
+mod serve;
 mod sim;
 mod simulator;
-mod stop;
+pub mod stop;
 mod verify;
 mod withhold;
 
@@ -56,6 +65,8 @@ struct Cli {
 enum Command {
     /// Drive the rig, record a log, and compute TE and backlash
     Run(Box<run::Args>),
+    /// Measure by a plan, each run in a log of its own; goes on where it ended
+    Campaign(Box<campaign::Args>),
     /// Recompute TE and backlash from logs
     Replay(replay::Args),
     /// Order spectra, long and short waves, averages and noise floor of logs
@@ -66,6 +77,16 @@ enum Command {
     Verify(verify::Args),
     /// Say what is in a log
     Info(info::Args),
+    /// Find what a rig's brake, encoders and zeros are, with uncertainties
+    Calibrate(calibrate::Args),
+    /// Check logs: every checksum, every sample's and message's number, both clocks
+    Audit(audit::Args),
+    /// Give logs that a killed run left behind their end
+    Recover(recover::Args),
+    /// List old logs, and delete them when told so
+    Prune(prune::Args),
+    /// Write the samples of a log as a table (CSV, Parquet, NumPy)
+    Export(export::Args),
     /// Make a log from a table of angles (CSV, Parquet)
     Import(import::Args),
     /// Ask the model of a gear pair: TE, backlash, drawings, checks
@@ -74,6 +95,12 @@ enum Command {
     Sim(sim::Args),
     /// Make withheld cases on the simulated rig, diagnose them, and score the answers
     Blindtest(blindtest::Args),
+    /// Check a rig's profile or a register map, or write a new profile
+    Profile(profile::Args),
+    /// Look at a rig before it runs and say what to do; nothing moves without --turn
+    Doctor(doctor::Args),
+    /// Show what the rig is doing, over HTTP; with a token, control it
+    Serve(serve::Args),
     /// End a run from another terminal, as Ctrl-C does
     Stop(stop::Args),
 }
@@ -92,15 +119,24 @@ pub fn main() -> ExitCode {
         .init();
     let exit = match Cli::parse().command {
         Command::Run(args) => run::main(&args),
+        Command::Campaign(args) => campaign::main(&args),
         Command::Replay(args) => replay::main(&args),
         Command::Analyse(args) => analyse::main(&args),
         Command::Diagnose(args) => diagnose::main(&args),
         Command::Verify(args) => verify::main(&args),
         Command::Info(args) => info::main(&args),
+        Command::Calibrate(args) => calibrate::main(&args),
+        Command::Audit(args) => audit::main(&args),
+        Command::Recover(args) => recover::main(&args),
+        Command::Prune(args) => prune::main(&args),
+        Command::Export(args) => export::main(&args),
         Command::Import(args) => import::main(&args),
         Command::Model(args) => model::main(&args),
         Command::Sim(args) => sim::main(&args),
         Command::Blindtest(args) => blindtest::main(&args),
+        Command::Profile(args) => profile::main(&args),
+        Command::Doctor(args) => doctor::main(&args),
+        Command::Serve(args) => serve::main(&args),
         Command::Stop(args) => stop::main(&args),
     };
     ExitCode::from(exit as u8)

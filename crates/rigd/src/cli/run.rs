@@ -12,6 +12,8 @@ use crate::clock::Clock;
 use crate::profile::Profile;
 use crate::quantity::{RATE, SPEED, TORQUE};
 use crate::run::Plan;
+use crate::run::attend::Policy;
+use crate::run::keys::Keys;
 use crate::run::rig::slip_power_w;
 use crate::run::session::{self, Links, Outcome, Setup};
 use crate::run::stop::StopRequests;
@@ -48,18 +50,27 @@ pub struct Args {
     /// The rig [default: the simulated rig]
     #[arg(long, value_name = "FILE")]
     profile: Option<PathBuf>,
+    /// Calibration that `rigd calibrate` wrote, in place of the profile's
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     /// Directory of the logs
     #[arg(long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
     /// Seed of the simulated rig [default: 1]
-    #[arg(long, conflicts_with = "profile")]
+    #[arg(long)]
     seed: Option<u64>,
     /// Simulated rig: `max` runs as fast as it can, `1` in real time over pseudo-terminals [default: max]
     #[arg(long, value_enum, conflicts_with = "profile")]
     time_scale: Option<TimeScale>,
     /// Simulated rig: an effect that the model does not know; may be repeated. `list` names them
-    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',', conflicts_with = "profile")]
+    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     undocumented: Vec<String>,
+    /// Wait so long for a device that was unplugged, then do the interrupted run again [default: end the run]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
+    reconnect: f64,
+    /// Drive a servo that has no watchdog of its own; somebody must stay at the emergency stop
+    #[arg(long)]
+    accept_no_watchdog: bool,
     /// Who runs it, for the log
     #[arg(long, default_value = "")]
     operator: String,
@@ -81,10 +92,20 @@ fn loads(text: &str) -> Result<Loads, crate::quantity::QuantityError> {
     TORQUE.parse_list(text).map(Loads)
 }
 
+/// A time of 0 s to a day.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let value: f64 =
+        text.trim_end_matches('s').trim().parse().map_err(|_| format!("'{text}' is no time in s; write 30"))?;
+    if (0.0..=86_400.0).contains(&value) { Ok(value) } else { Err(format!("{text} is not within 0 and 86400 s")) }
+}
+
+/// How fast the simulated rig runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum TimeScale {
+pub enum TimeScale {
+    /// Real time.
     #[value(name = "1")]
     Real,
+    /// As fast as it can.
     Max,
 }
 
@@ -111,6 +132,8 @@ enum Refusal {
         "--model {model}: its gears are not those of the simulated rig, {pair}; give the pair that the model was made from with --pair"
     )]
     OtherGears { model: PathBuf, pair: String },
+    #[error("{option} is the simulated rig's, and profile '{profile}' has real ports; leave it out")]
+    SimulatedOnly { option: &'static str, profile: String },
     #[error("profile '{profile}' mixes port \"sim\" with real ports; all three devices are simulated, or none")]
     MixedPorts { profile: String },
 }
@@ -140,10 +163,13 @@ pub fn main(args: &Args) -> Exit {
 }
 
 fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::error::Error>> {
-    let profile = match &args.profile {
+    let mut profile = match &args.profile {
         Some(path) => Profile::load(path)?,
         None => Profile::simulated(),
     };
+    if let Some(calibration) = &args.calibration {
+        profile.calibrate(calibration)?;
+    }
     session::check_drivers(&profile)?;
     let (pair_toml, model) = pair::load(args.model.as_deref().or(args.pair.as_deref()))?;
     let plan = Plan {
@@ -152,6 +178,7 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
         speed_rpm: args.rpm,
         revolutions: f64::from(args.revs),
         rate_hz: args.rate,
+        accept_no_watchdog: args.accept_no_watchdog,
     };
     refuse(&profile, &plan)?;
     if let Some(name) = args.undocumented.iter().find(|name| !sim::is_undocumented(name)) {
@@ -164,12 +191,19 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
     if simulated == 1 || simulated == 2 {
         return Err(Box::new(Refusal::MixedPorts { profile: profile.name }));
     }
+    for (option, given) in [("--seed", args.seed.is_some()), ("--undocumented", !args.undocumented.is_empty())] {
+        if given && !profile.in_process() {
+            return Err(Box::new(Refusal::SimulatedOnly { option, profile: profile.name }));
+        }
+    }
     // The simulated rig's gears are those of the pair, with its documented errors and what is left undocumented; a model is
     // what it is compared with, and changes nothing on it.
     let spec = if profile.in_process() {
         let (plant_toml, plant) = pair::load(args.pair.as_deref())?;
         same_gears(args, &plant_toml, &pair_toml)?;
-        Some(sim::spec(&plant, &args.undocumented)?)
+        let mut spec = sim::spec(&plant, &args.undocumented)?;
+        sim::mount_discs(&mut spec, &profile);
+        Some(spec)
     } else {
         None
     };
@@ -182,6 +216,7 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
         operator: args.operator.clone(),
         note: args.note.clone(),
         quiet: args.quiet,
+        policy: Policy { reconnect_s: args.reconnect, suspend: None },
     };
     Ok((setup, spec))
 }
@@ -235,7 +270,7 @@ fn refuse(profile: &Profile, plan: &Plan) -> Result<(), Refusal> {
 }
 
 /// Finalises what an earlier, killed run left behind.
-fn recover(directory: &Path) {
+pub fn recover(directory: &Path) {
     match riglog::recover_directory(directory) {
         Ok(logs) => {
             for (path, outcome) in logs {
@@ -335,6 +370,8 @@ fn in_runtime(
     let warnings = warnings(&setup);
     let outcome = LocalSet::new().block_on(&runtime, async move {
         let stop = StopRequests::listen().map_err(|error| format!("signals: {error}"))?;
+        stop.listen_for_pause().map_err(|error| format!("signals: {error}"))?;
+        let _keys = Keys::listen(&stop);
         let (links, _simulator) = connect(&mut setup)?;
         let clock = if simulated { Clock::simulated() } else { Clock::real() };
         session::run(setup, links, clock, stop).await.map_err(|error| error.to_string())
@@ -360,6 +397,7 @@ fn conclude(args: &Args, path: &Path, backend: String, warnings: Vec<String>, ou
         warnings: warnings.into_iter().chain(outcome.troubles.iter().cloned()).collect(),
     };
     let mut summary = Summary::of(&outcome.analysis, origin);
+    summary.lines.clone_from(&outcome.lines);
     let picture = path.with_extension("svg");
     match plot::draw(&outcome.analysis, &picture) {
         Ok(true) => summary.plot = Some(picture.display().to_string()),

@@ -24,6 +24,13 @@ pub struct Args {
     /// An effect that the model does not know; may be repeated
     #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     undocumented: Vec<String>,
+    /// Write a table of the true shaft speeds, whatever encoders and drives say
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Take commands from standard input, a line each: `estop press`, `estop release`, `heat CELSIUS`, `no-watchdog`,
+    /// `counter restart`
+    #[arg(long)]
+    commands: bool,
     #[command(flatten)]
     withhold: withhold::Args,
 }
@@ -49,9 +56,10 @@ pub fn main(args: &Args) -> Exit {
         Ok(runtime) => runtime,
         Err(error) => return fail(Exit::Failed, &error),
     };
+    let extras = sim::Extras { record: args.record.clone(), commands: args.commands };
     let outcome = LocalSet::new().block_on(&runtime, async {
         let stop = StopRequests::listen().map_err(|source| sim::SimError::Io { what: "signals".into(), source })?;
-        sim::serve_ptys(&spec, args.seed, &args.pty_dir, &Profile::simulated(), stop).await
+        sim::serve_ptys(&spec, args.seed, &args.pty_dir, &Profile::simulated(), &extras, stop).await
     });
     match outcome {
         Ok(()) => Exit::Done,

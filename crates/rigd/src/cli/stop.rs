@@ -47,11 +47,12 @@ impl Drop for Running {
     }
 }
 
-/// Runs the command.
-pub fn main(_: &Args) -> Exit {
+/// Process numbers of the runs of this user that are under way. What dead runs left behind is cleared away.
+#[must_use]
+pub fn runs() -> Vec<i32> {
     let entries =
         std::fs::read_dir(directory()).map(|entries| entries.flatten().collect::<Vec<_>>()).unwrap_or_default();
-    let mut stopped = 0;
+    let mut runs = Vec::new();
     for entry in entries {
         let path = entry.path();
         let Ok(file) = File::open(&path) else { continue };
@@ -60,12 +61,22 @@ pub fn main(_: &Args) -> Exit {
             let _ = std::fs::remove_file(&path);
             continue;
         }
-        let pid = std::fs::read_to_string(&path).ok().and_then(|text| text.trim().parse().ok());
-        if let Some(pid) = pid.filter(|pid| kill(Pid::from_raw(*pid), Signal::SIGINT).is_ok()) {
-            print(&format!("stopping run {pid}"));
-            stopped += 1;
-        }
+        runs.extend(std::fs::read_to_string(&path).ok().and_then(|text| text.trim().parse::<i32>().ok()));
     }
+    runs
+}
+
+/// Sends a signal to the runs under way that `wanted` chooses; how many got it.
+pub fn signal_runs(signal: Signal, wanted: impl Fn(i32) -> bool) -> usize {
+    runs().into_iter().filter(|pid| wanted(*pid) && kill(Pid::from_raw(*pid), signal).is_ok()).count()
+}
+
+/// Runs the command.
+pub fn main(_: &Args) -> Exit {
+    let stopped = signal_runs(Signal::SIGINT, |pid| {
+        print(&format!("stopping run {pid}"));
+        true
+    });
     if stopped == 0 {
         eprintln!("error: no run of this user is under way");
         return Exit::BadInput;

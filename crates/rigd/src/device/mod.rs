@@ -1,9 +1,14 @@
 //! Devices by what they do. One device is one file and one line in its list.
 
-pub mod asda_b2;
+pub mod absent;
 pub mod bus;
 pub mod counter_box;
-pub mod rd60xx;
+pub mod dsp7000;
+pub mod map;
+pub mod mapped_brake;
+pub mod mapped_servo;
+pub mod refused;
+pub mod two_clocks;
 
 use std::time::Duration;
 
@@ -14,6 +19,38 @@ use wire::counter_box::Samples;
 use crate::link::{Address, Link};
 use crate::profile::{BrakeProfile, CounterProfile, ServoProfile};
 pub use bus::BusError;
+
+/// The three devices of a rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Part {
+    /// The servo drive.
+    Servo,
+    /// The brake's driver.
+    Brake,
+    /// The reader of the encoders.
+    Counter,
+}
+
+impl Part {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Servo, Self::Brake, Self::Counter];
+
+    /// As profiles, messages and errors call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Servo => "servo",
+            Self::Brake => "brake",
+            Self::Counter => "counter",
+        }
+    }
+}
+
+impl std::fmt::Display for Part {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
 
 /// Who a device says it is.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,6 +146,24 @@ pub enum DeviceError {
         /// What it said last.
         status: String,
     },
+    /// Its register map cannot be used.
+    #[error("{device}: {reason}; `rigd profile check` shows every fault")]
+    Map {
+        /// Which device.
+        device: &'static str,
+        /// What is wrong with the map.
+        reason: String,
+    },
+    /// Its line failed, or said what it must not.
+    #[error("{device} on {port}: {what}")]
+    Line {
+        /// Which device.
+        device: &'static str,
+        /// Its port.
+        port: String,
+        /// What happened, and what to check.
+        what: String,
+    },
     /// The encoders' stream stopped.
     #[error("counter on {port}: {what}; check power, cable and plug")]
     Counter {
@@ -125,6 +180,14 @@ pub enum DeviceError {
         /// The drive's code and its meaning.
         alarm: String,
     },
+    /// The servo does not tell its torque.
+    #[error(
+        "servo on {port}: this drive does not tell its torque; calibrate the brake with a torque transducer, and write the curve into the profile"
+    )]
+    NoTorque {
+        /// Its port.
+        port: String,
+    },
     /// The servo has no watchdog of its own.
     #[error(
         "servo on {port}: register {register} (communication watchdog) reads back {read}, wanted {wanted}; without it the motor turns on when this program dies"
@@ -133,7 +196,7 @@ pub enum DeviceError {
         /// Its port.
         port: String,
         /// The parameter.
-        register: &'static str,
+        register: String,
         /// What it reads.
         read: String,
         /// What was written.
@@ -146,7 +209,8 @@ pub enum DeviceError {
 pub trait Servo {
     /// Who it is.
     async fn identify(&mut self) -> Result<Identity, DeviceError>;
-    /// Sets speed mode, ramps and the communication watchdog, and reads all of them back. The motor stays off.
+    /// Sets speed mode, ramps and, last of all, the communication watchdog, and reads all of them back. The motor stays off.
+    /// [`DeviceError::NoWatchdog`] leaves the drive prepared but for that.
     async fn prepare(&mut self, accel_ms: f64, decel_ms: f64, lease: Duration) -> Result<(), DeviceError>;
     /// The fastest that the drive allows, motor rpm, as read back.
     async fn max_motor_rpm(&mut self) -> Result<f64, DeviceError>;
@@ -156,6 +220,15 @@ pub trait Servo {
     async fn set_motor_rpm(&mut self, rpm: f64) -> Result<(), DeviceError>;
     /// What it says of itself. Any transaction renews the lease.
     async fn status(&mut self) -> Result<ServoStatus, DeviceError>;
+    /// Motor torque in percent of the rated one, and the step in which it is told; `None` where the drive does not tell.
+    async fn motor_torque_percent(&mut self) -> Result<Option<(f64, f64)>, DeviceError> {
+        Ok(None)
+    }
+    /// Whether an alarm's code is that of the emergency stop's input.
+    fn is_emergency_stop(&self, alarm: u16) -> bool {
+        let _ = alarm;
+        false
+    }
     /// What happened on its line.
     fn statistics(&self) -> bus::BusStatistics;
 }
@@ -195,11 +268,16 @@ pub trait Counter {
 /// Drivers by their name in the profile: each is opened on its link.
 type Drivers<P, D> = &'static [(&'static str, fn(Link, Address, &P) -> Box<D>)];
 
+/// Driver's name of a device whose register map is a file of its own, named by `map`.
+pub const MAP: &str = "map";
+
 /// Servo drives by their name in the profile.
-pub const SERVOS: Drivers<ServoProfile, dyn Servo> = &[("asda-b2", asda_b2::open)];
+pub const SERVOS: Drivers<ServoProfile, dyn Servo> =
+    &[("asda-b2", mapped_servo::open), ("dsy-rs", mapped_servo::open), (MAP, mapped_servo::open)];
 
 /// Brake drivers by their name in the profile.
-pub const BRAKES: Drivers<BrakeProfile, dyn Brake> = &[("rd60xx", rd60xx::open)];
+pub const BRAKES: Drivers<BrakeProfile, dyn Brake> =
+    &[("rd60xx", mapped_brake::open), ("dsp7000", dsp7000::open), (MAP, mapped_brake::open)];
 
 /// Encoder readers by their name in the profile.
 pub const COUNTERS: Drivers<CounterProfile, dyn Counter> = &[("counter-box", counter_box::open)];

@@ -1,10 +1,15 @@
 //! The rig's profile: which devices, on which ports, within which limits. TOML, checked before anything moves.
 
+pub mod check;
+pub mod lines;
+
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+use crate::calibration::{Calibration, CalibrationFileError};
 
 /// The embedded profile: emulated hardware in this process.
 pub const SIM_PROFILE: &str = include_str!("sim.toml");
@@ -21,6 +26,12 @@ pub struct Profile {
     /// Where the registers and limits were taken from.
     #[serde(default)]
     pub source: String,
+    /// The rig's calibration, beside the profile; `rigd calibrate` writes it. Its brake curve replaces the one below.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<PathBuf>,
+    /// The calibration's text as it was read, for the log.
+    #[serde(skip)]
+    pub calibration_toml: Option<String>,
     /// The servo drive.
     pub servo: ServoProfile,
     /// The powder brake and its current source.
@@ -41,6 +52,9 @@ pub struct Profile {
 pub struct ServoProfile {
     /// Driver's name, see `device::SERVOS`.
     pub driver: String,
+    /// Register map, with driver `map`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<PathBuf>,
     /// Path, `tcp://host:port`, or `sim`.
     pub port: String,
     /// Line speed, bit/s.
@@ -65,6 +79,9 @@ pub struct ServoProfile {
 pub struct BrakeProfile {
     /// Driver's name, see `device::BRAKES`.
     pub driver: String,
+    /// Register map, with driver `map`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<PathBuf>,
     /// Path, `tcp://host:port`, or `sim`.
     pub port: String,
     /// Line speed, bit/s.
@@ -104,6 +121,13 @@ pub struct CounterProfile {
     pub input_sign: i8,
     /// +1 or −1, likewise for the driven gear.
     pub output_sign: i8,
+    /// How far the input encoder's disc is turned on its shaft against its usual place, in the angle's positive sense, deg: for its
+    /// calibration, where it is re-mounted. The angles stay those of the gears.
+    #[serde(default)]
+    pub input_mounted_deg: f64,
+    /// Likewise the output encoder's.
+    #[serde(default)]
+    pub output_mounted_deg: f64,
 }
 
 /// Limits, refused before motion and supervised during it.
@@ -150,6 +174,40 @@ pub struct LogPolicy {
     pub chunk_ms: u32,
     /// The file is synced to disk after this time, ms.
     pub sync_ms: u32,
+    /// The log goes on in a new file at this size, MB; 0 is never.
+    #[serde(default)]
+    pub rotate_mb: f64,
+    /// The log goes on in a new file after this time, minutes; 0 is never.
+    #[serde(default)]
+    pub rotate_minutes: f64,
+    /// Under this much free space the run warns, MB.
+    #[serde(default = "warn_free_mb")]
+    pub warn_free_mb: f64,
+    /// Under this much free space no run begins, and one under way stops in order, MB.
+    #[serde(default = "stop_free_mb")]
+    pub stop_free_mb: f64,
+}
+
+/// Ten hours at 18 kHz, and some.
+fn warn_free_mb() -> f64 {
+    2000.0
+}
+
+/// Far more than what is queued and the end of a log need.
+fn stop_free_mb() -> f64 {
+    100.0
+}
+
+impl LogPolicy {
+    /// When the log goes on in a new file.
+    #[must_use]
+    pub fn rotation(&self) -> riglog::Rotation {
+        const BYTES_PER_MB: f64 = 1e6;
+        riglog::Rotation {
+            bytes: (self.rotate_mb > 0.0).then_some((self.rotate_mb * BYTES_PER_MB) as u64),
+            period: (self.rotate_minutes > 0.0).then(|| Duration::from_secs_f64(self.rotate_minutes * 60.0)),
+        }
+    }
 }
 
 /// Why a profile is refused.
@@ -171,6 +229,9 @@ pub enum ProfileError {
         /// Line, key and reason.
         source: Box<toml::de::Error>,
     },
+    /// Its calibration.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationFileError),
     /// A value is outside its range.
     #[error("profile {path}: {key} = {value} must be {expected}")]
     Value {
@@ -202,7 +263,22 @@ impl Profile {
     /// [`ProfileError`] names file, line, key, value and what is accepted.
     pub fn load(path: &Path) -> Result<Self, ProfileError> {
         let text = std::fs::read_to_string(path).map_err(|source| ProfileError::Read { path: path.into(), source })?;
-        Self::parse(&text, path)
+        let mut profile = Self::parse(&text, path)?;
+        if let Some(calibration) = profile.calibration.clone() {
+            profile.calibrate(&path.parent().unwrap_or(Path::new("")).join(calibration))?;
+        }
+        Ok(profile)
+    }
+
+    /// Takes over the calibration at `path`.
+    ///
+    /// # Errors
+    /// [`ProfileError::Calibration`] names the file and what is wrong with it.
+    pub fn calibrate(&mut self, path: &Path) -> Result<(), ProfileError> {
+        let (calibration, text) = Calibration::load(path)?;
+        calibration.apply(self);
+        self.calibration_toml = Some(text);
+        Ok(())
     }
 
     /// Checks a profile's text; `path` is for the error.
@@ -262,6 +338,25 @@ impl Profile {
         if !(10..=1000).contains(&self.log.sync_ms) {
             return refuse("log.sync_ms", self.log.sync_ms.to_string(), "from 10 to 1000 ms".into());
         }
+        for (key, value) in [
+            ("counter.input_mounted_deg", self.counter.input_mounted_deg),
+            ("counter.output_mounted_deg", self.counter.output_mounted_deg),
+        ] {
+            if !(-360.0..=360.0).contains(&value) {
+                return refuse(key, value.to_string(), "from -360 to 360".into());
+            }
+        }
+        // A million minutes are two years; a part under 10 kB would be mostly head.
+        for (key, value, least, most) in [
+            ("log.rotate_mb", self.log.rotate_mb, 0.01, 1e6),
+            ("log.rotate_minutes", self.log.rotate_minutes, 0.01, 1e6),
+            ("log.warn_free_mb", self.log.warn_free_mb, 0.0, 1e9),
+            ("log.stop_free_mb", self.log.stop_free_mb, 0.0, 1e9),
+        ] {
+            if value != 0.0 && !(least..=most).contains(&value) {
+                return refuse(key, value.to_string(), format!("0, or from {least} to {most}"));
+            }
+        }
         for (key, sign) in [
             ("servo.sense", self.servo.sense),
             ("counter.input_sign", self.counter.input_sign),
@@ -283,6 +378,11 @@ impl Profile {
             }
         }
         Ok(())
+    }
+
+    /// From a table that was read already.
+    fn deserialize_table(table: &toml::Table) -> Result<Self, toml::de::Error> {
+        Self::deserialize(toml::Value::Table(table.clone()))
     }
 
     /// Period of the drives' polling.
@@ -323,6 +423,15 @@ impl BrakeProfile {
         let (low, high) = (self.rising[above - 1], self.rising[above]);
         let current = low[0] + (torque - low[1]) / (high[1] - low[1]) * (high[0] - low[0]);
         (current <= self.current_limit_a).then_some(current)
+    }
+
+    /// As [`BrakeProfile::current_a`], where the coil has `from_a` now: down from a larger current, the torque lies on the falling branch.
+    #[must_use]
+    pub fn current_from_a(&self, load_nm: f64, from_a: f64) -> Option<f64> {
+        let up = self.current_a(load_nm)?;
+        let falling = Self { rising: self.falling.clone(), ..self.clone() };
+        let down = falling.current_a(load_nm).filter(|down| *down < from_a && up < from_a);
+        Some(down.unwrap_or(up))
     }
 
     /// Load at the driven gear for a coil current on the rising branch.

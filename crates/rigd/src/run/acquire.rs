@@ -10,7 +10,10 @@ use wire::counter_box::{SampleFlags, Samples};
 use super::recorder::{Entry, Recorder};
 use crate::analysis::Analysis;
 use crate::clock::Clock;
-use crate::device::CounterIdentity;
+use crate::device::{CounterIdentity, DeviceError};
+
+/// An index that comes back further off than this part of a line is not the same index: counts were lost, or a disc has slipped.
+const INDEX_TOLERANCE_LINES: f64 = 0.25;
 
 /// What the sequencer knows of the rig; written to `/rig/state`.
 #[derive(Debug, Clone, Copy, Default)]
@@ -50,7 +53,9 @@ enum Recording {
         began_ns: u64,
         lost_before: u64,
     },
-    Done,
+    Done {
+        revolutions: f64,
+    },
 }
 
 /// Latest values, for the progress line and the supervisor.
@@ -72,6 +77,8 @@ pub struct Latest {
     pub backlash_rad: Option<f64>,
     /// Revolutions of the active run.
     pub revolutions: f64,
+    /// TE less the model's at the last sample, rad; NaN unless the rig settles.
+    pub residual_rad: f64,
     /// Largest |TE − model − zero| of the active run, rad: polls are rarer than batches, and none may be missed.
     pub excursion_rad: f64,
 }
@@ -85,8 +92,16 @@ pub struct Acquisition {
     theta1: AngleScale,
     theta2: AngleScale,
     homed: bool,
+    /// The encoders' metadata are in the log, so that the index has to stay at the counts that they say.
+    zero_written: bool,
     /// Unix time minus device time, ns.
     device_offset_ns: Option<i128>,
+    /// Running number in the log minus the counter's own.
+    number_offset: u64,
+    /// Logged counts minus the counter's own.
+    counts_offset: [i64; 2],
+    /// The counter begins anew: it numbers its samples from 0, and may count from anywhere.
+    restarts: bool,
     next_sample: u64,
     samples: u64,
     lost: u64,
@@ -96,6 +111,8 @@ pub struct Acquisition {
     te_zero_rad: Option<f64>,
     /// Index latches: seen, and the counter value there.
     index_counts: [Option<i64>; 2],
+    /// How far each disc is turned on its shaft, deg.
+    mounted_deg: [f64; 2],
     /// Last counts.
     counts: [i64; 2],
     /// What the rig is doing.
@@ -129,7 +146,11 @@ impl Acquisition {
             theta2: encoders.theta2(),
             encoders,
             homed: false,
+            zero_written: false,
             device_offset_ns: None,
+            number_offset: 0,
+            counts_offset: [0; 2],
+            restarts: false,
             next_sample: 0,
             samples: 0,
             lost: 0,
@@ -138,6 +159,7 @@ impl Acquisition {
             previous_theta1_rad: None,
             te_zero_rad: None,
             index_counts: [None; 2],
+            mounted_deg: [0.0; 2],
             counts: [0; 2],
             status: Status::default(),
             latest: Latest::default(),
@@ -146,8 +168,23 @@ impl Acquisition {
         }
     }
 
-    /// The encoders as the counter describes them; before the stream starts.
-    pub fn set_encoders(&mut self, identity: &CounterIdentity, signs: [i8; 2]) {
+    /// The encoders as the counter describes them; before the stream starts. Those of a counter that comes back must be the same.
+    ///
+    /// # Errors
+    /// [`DeviceError::Unexpected`] for another counter or another encoder than the log was begun with.
+    pub fn set_encoders(&mut self, identity: &CounterIdentity, signs: [i8; 2], port: &str) -> Result<(), DeviceError> {
+        if self.zero_written {
+            let known = [self.encoders.input_counts_per_rev, self.encoders.output_counts_per_rev];
+            if known == identity.counts_per_rev {
+                return Ok(());
+            }
+            return Err(DeviceError::Unexpected {
+                device: "counter",
+                port: port.to_owned(),
+                found: format!("{:?} counts a revolution", identity.counts_per_rev),
+                expected: format!("{known:?}, as when the log was begun (begin a new one for other encoders)"),
+            });
+        }
         self.encoders = EncoderMetadata {
             input_counts_per_rev: identity.counts_per_rev[0],
             output_counts_per_rev: identity.counts_per_rev[1],
@@ -159,6 +196,51 @@ impl Acquisition {
             output_sign: signs[1],
         };
         self.rescale();
+        Ok(())
+    }
+
+    /// The counter is lost: what it streams when it is back is numbered on after what is missing, and homed again.
+    pub fn stream_lost(&mut self) {
+        self.restarts = true;
+        self.forget_index();
+    }
+
+    /// Samples numbered so far, lost ones included.
+    #[must_use]
+    pub fn samples_numbered(&self) -> u64 {
+        self.next_sample
+    }
+
+    /// Goes on in another log; the encoders' metadata are written there too. Gives the log so far back, to be finalised.
+    #[must_use]
+    pub fn change_recorder(&mut self, recorder: Recorder) -> Recorder {
+        let before = std::mem::replace(&mut self.recorder, recorder);
+        if self.zero_written {
+            let now = self.clock.now_ns();
+            self.recorder.write(now, now, Entry::Encoders(self.encoders));
+        }
+        before
+    }
+
+    /// The analysis so far, to drop what is not needed any more.
+    pub fn analysis_mut(&mut self) -> &mut Analysis {
+        &mut self.analysis
+    }
+
+    /// The discs are turned on their shafts by this, deg: their indices pass so much later than usual.
+    pub fn set_mounting(&mut self, mounted_deg: [f64; 2]) {
+        self.mounted_deg = mounted_deg;
+    }
+
+    /// Latched counts of an index as they would be with the disc in its usual place.
+    ///
+    /// A disc turned by φ passes its index where the shaft stands at φ, so that θ = sign · 2π · (counts − index) / n + φ.
+    fn usual_index(&self, which: usize, latched: i64) -> i64 {
+        let (sign, counts_per_rev) = match which {
+            0 => (self.encoders.input_sign, self.encoders.input_counts_per_rev),
+            _ => (self.encoders.output_sign, self.encoders.output_counts_per_rev),
+        };
+        latched - (f64::from(sign) * self.mounted_deg[which] / 360.0 * counts_per_rev as f64).round() as i64
     }
 
     fn rescale(&mut self) {
@@ -230,24 +312,68 @@ impl Acquisition {
         self.homed = false;
     }
 
-    /// Takes the index as zero of both angles and writes the encoders' metadata.
+    /// Takes the index as zero of both angles and writes the encoders' metadata; from the second time on the index is checked
+    /// against the first, and stays where the log says that it is.
     ///
     /// The driven gear's index repeats every turn; the turn is taken that puts TE within half a turn of zero.
     pub fn home(&mut self) {
         let [Some(input), Some(output)] = self.index_counts else { return };
-        self.encoders.input_index_counts = input;
-        self.encoders.output_index_counts = output;
+        let [input, output] = [self.usual_index(0, input), self.usual_index(1, output)];
+        if self.zero_written {
+            self.check_index([input, output]);
+        } else {
+            self.encoders.input_index_counts = input;
+            self.encoders.output_index_counts = output;
+        }
         self.rescale();
         let theta1 = self.theta1.angle_rad(self.counts[0]);
         let theta2 = self.theta2.angle_rad(self.counts[1]);
         let turns = ((theta2 - self.analysis.model().pair.theta2(theta1)) / std::f64::consts::TAU).round() as i64;
-        self.encoders.output_index_counts +=
-            turns * i64::from(self.encoders.output_sign) * self.encoders.output_counts_per_rev as i64;
-        self.rescale();
+        let turned = turns * i64::from(self.encoders.output_sign) * self.encoders.output_counts_per_rev as i64;
         self.homed = true;
         self.previous_theta1_rad = None;
+        if self.zero_written {
+            self.shift(1, -turned);
+            return;
+        }
+        self.encoders.output_index_counts += turned;
+        self.rescale();
+        self.zero_written = true;
         let now = self.clock.now_ns();
         self.recorder.write(now, now, Entry::Encoders(self.encoders));
+    }
+
+    /// Where the indices are now against where the log says: within a fraction of a line the zero stays as it was; anything else
+    /// moves the counts, so that the index stays at its counts and the angles keep their meaning.
+    fn check_index(&mut self, latched: [i64; 2]) {
+        let encoders = self.encoders;
+        let known = [
+            (encoders.input_index_counts, encoders.input_counts_per_rev, encoders.input_lines),
+            (encoders.output_index_counts, encoders.output_counts_per_rev, encoders.output_lines),
+        ];
+        for (which, (name, (index, per_rev, lines))) in ["input", "output"].into_iter().zip(known).enumerate() {
+            let off = (latched[which] - index).rem_euclid(per_rev as i64);
+            let off = if off > per_rev as i64 / 2 { off - per_rev as i64 } else { off };
+            let tolerance = INDEX_TOLERANCE_LINES * per_rev as f64 / lines.max(1) as f64;
+            let arcsec = off as f64 / per_rev as f64 * 1_296_000.0;
+            if off.unsigned_abs() as f64 <= tolerance {
+                let what = format!("{name} encoder: index at its place, {off} counts ({arcsec:.2} arcsec) off");
+                self.event(Level::Info, "index check", what);
+                continue;
+            }
+            self.shift(which, -off);
+            let what = format!(
+                "{name} encoder: index {off} counts ({arcsec:.1} arcsec) off; the counts are moved so that it stays at its place (the counter began anew, counts were lost, or the disc has slipped)"
+            );
+            self.event(Level::Warning, "index check", what);
+        }
+    }
+
+    /// Moves an encoder's logged counts from here on.
+    fn shift(&mut self, which: usize, by: i64) {
+        self.counts_offset[which] += by;
+        self.counts[which] += by;
+        self.index_counts[which] = self.index_counts[which].map(|counts| counts + by);
     }
 
     /// Records `revolutions` whole turns from the next bin edge on.
@@ -261,7 +387,26 @@ impl Acquisition {
     /// The armed run is over.
     #[must_use]
     pub fn recorded(&self) -> bool {
-        matches!(self.recording, Recording::Done)
+        matches!(self.recording, Recording::Done { .. })
+    }
+
+    /// Revolutions of the run that is over.
+    #[must_use]
+    pub fn recorded_revolutions(&self) -> f64 {
+        match self.recording {
+            Recording::Done { revolutions } => revolutions,
+            _ => 0.0,
+        }
+    }
+
+    /// Ends the active run at the end of the revolution that it is in; one that has not begun does not begin.
+    pub fn end_with_revolution(&mut self) {
+        let under_way = (self.latest.revolutions + 1e-9).ceil().max(1.0) * std::f64::consts::TAU;
+        match &mut self.recording {
+            Recording::Active { extent_rad, .. } => *extent_rad = extent_rad.min(under_way),
+            Recording::Armed { .. } => self.recording = Recording::Done { revolutions: 0.0 },
+            Recording::Idle | Recording::Done { .. } => {}
+        }
     }
 
     /// Ends a run before its time: what was recorded stays, and the state says where it ends.
@@ -307,35 +452,69 @@ impl Acquisition {
         if count == 0 {
             return;
         }
-        let last_device_ns = batch.device_time_ns + (count as u64 - 1) * u64::from(batch.dt_ns);
-        let offset = *self.device_offset_ns.get_or_insert(i128::from(arrived) - i128::from(last_device_ns));
-        let first_ns = (i128::from(batch.device_time_ns) + offset) as u64;
-        self.count_losses(batch.first_sample);
-        self.next_sample = batch.first_sample + count as u64;
+        let first_ns = self.date(batch, arrived);
+        let first_sample = batch.first_sample.wrapping_add(self.number_offset);
+        self.count_losses(first_sample);
+        self.next_sample = first_sample + count as u64;
         self.samples += count as u64;
         for (latched, seen, counts) in [
             (0, batch.flags.has(SampleFlags::INPUT_INDEX), batch.input_index_counts),
             (1, batch.flags.has(SampleFlags::OUTPUT_INDEX), batch.output_index_counts),
         ] {
             if seen {
-                self.index_counts[latched] = Some(counts);
+                self.index_counts[latched] = Some(counts.wrapping_add(self.counts_offset[latched]));
             }
         }
-        accumulate(batch.input_base, &batch.input_delta, &mut self.inputs);
-        accumulate(batch.output_base, &batch.output_delta, &mut self.outputs);
+        let [input_offset, output_offset] = self.counts_offset;
+        accumulate(batch.input_base.wrapping_add(input_offset), &batch.input_delta, &mut self.inputs);
+        accumulate(batch.output_base.wrapping_add(output_offset), &batch.output_delta, &mut self.outputs);
         self.measure_speed(batch.dt_ns);
         self.latest.arrived_ns = arrived;
 
         let mut written = 0;
-        if self.homed && !matches!(self.recording, Recording::Idle | Recording::Done) {
-            written = self.scan(batch, first_ns, arrived);
+        if self.homed && !matches!(self.recording, Recording::Idle | Recording::Done { .. }) {
+            written = self.scan(batch, first_ns, first_sample, arrived);
         } else if self.homed {
             self.previous_theta1_rad = Some(self.theta1.angle_rad(self.inputs[count - 1]));
         }
-        self.write_part(batch, first_ns, arrived, written, count);
+        self.write_part(batch, [first_ns, first_sample], arrived, written, count);
         self.counts = [self.inputs[count - 1], self.outputs[count - 1]];
         self.latest.theta1_rad = self.theta1.angle_rad(self.counts[0]);
+        self.latest.residual_rad = self.residual_rad();
         self.latest.sample_ns = first_ns + (count as u64 - 1) * u64::from(batch.dt_ns);
+    }
+
+    /// Unix time of a batch's first sample, ns. A counter that begins anew is dated and numbered anew: by when its first batch
+    /// arrives, after the samples that are missing meanwhile.
+    fn date(&mut self, batch: &Samples, arrived: u64) -> u64 {
+        let count = batch.input_delta.len() as u64;
+        let last_device_ns = batch.device_time_ns + (count - 1) * u64::from(batch.dt_ns);
+        let offset_now = i128::from(arrived) - i128::from(last_device_ns);
+        if std::mem::take(&mut self.restarts) {
+            self.device_offset_ns = None;
+            self.previous_theta1_rad = None;
+            // Nothing was sent before the first sample that there ever was.
+            let first_ns = (i128::from(batch.device_time_ns) + offset_now).max(0) as u64;
+            let dt_ns = u64::from(batch.dt_ns.max(1));
+            // To the nearest: the end of an abandoned run lies a nanosecond past its last sample.
+            let since_ns = first_ns.saturating_sub(self.latest.sample_ns);
+            let periods = if self.samples == 0 { 1 } else { (since_ns + dt_ns / 2) / dt_ns };
+            let number = self.next_sample + periods.max(1) - 1;
+            self.number_offset = number.wrapping_sub(batch.first_sample);
+        }
+        let offset = *self.device_offset_ns.get_or_insert(offset_now);
+        (i128::from(batch.device_time_ns) + offset) as u64
+    }
+
+    /// TE less the model's at the last sample: what settling is judged by.
+    fn residual_rad(&self) -> f64 {
+        if !self.homed || self.status.phase != Phase::Settle {
+            return f64::NAN;
+        }
+        let (theta1, theta2) = (self.theta1.angle_rad(self.counts[0]), self.theta2.angle_rad(self.counts[1]));
+        let model = self.analysis.model();
+        let direction = self.status.direction.unwrap_or(Direction::Ccw);
+        theta2 - model.pair.theta2(theta1) - model.te_rad(theta1, direction, self.status.load_setpoint_nm)
     }
 
     fn count_losses(&mut self, first_sample: u64) {
@@ -362,7 +541,7 @@ impl Acquisition {
     }
 
     /// Walks the samples of a run; returns how many of the batch have been written already.
-    fn scan(&mut self, batch: &Samples, first_ns: u64, arrived: u64) -> usize {
+    fn scan(&mut self, batch: &Samples, first_ns: u64, number: u64, arrived: u64) -> usize {
         let grid = AngleGrid::default();
         let mut written = 0;
         for index in 0..self.inputs.len() {
@@ -374,19 +553,24 @@ impl Acquisition {
                         self.previous_theta1_rad.and_then(|previous| edge_between(grid, previous, theta1, direction));
                     self.previous_theta1_rad = Some(theta1);
                     let Some(edge_rad) = edge else { continue };
-                    self.write_part(batch, first_ns, arrived, written, index);
+                    self.write_part(batch, [first_ns, number], arrived, written, index);
                     written = index;
-                    self.begin_run(edge_rad, batch, first_ns, index, arrived);
+                    self.begin_run(
+                        edge_rad,
+                        first_ns + index as u64 * u64::from(batch.dt_ns),
+                        number + index as u64,
+                        arrived,
+                    );
                 }
                 Recording::Active { edge_rad, extent_rad, sense, .. } => {
                     if (theta1 - edge_rad) * sense >= *extent_rad {
-                        self.write_part(batch, first_ns, arrived, written, index);
+                        self.write_part(batch, [first_ns, number], arrived, written, index);
                         written = index;
                         let end_ns = first_ns + index as u64 * u64::from(batch.dt_ns);
-                        self.end_run(end_ns, batch.first_sample + index as u64);
+                        self.end_run(end_ns, number + index as u64);
                     }
                 }
-                Recording::Idle | Recording::Done => break,
+                Recording::Idle | Recording::Done { .. } => break,
             }
             if let Recording::Active { edge_rad, .. } = self.recording {
                 let theta2 = self.theta2.angle_rad(self.outputs[index]);
@@ -422,26 +606,25 @@ impl Acquisition {
         self.recorder.write(arrived, time_ns, Entry::Te(message));
     }
 
-    fn begin_run(&mut self, edge_rad: f64, batch: &Samples, first_ns: u64, index: usize, arrived: u64) {
+    fn begin_run(&mut self, edge_rad: f64, began_ns: u64, first_sample: u64, arrived: u64) {
         let Recording::Armed { conditions, revolutions } = self.recording else { return };
-        let began_ns = first_ns + index as u64 * u64::from(batch.dt_ns);
         self.recording = Recording::Active {
             edge_rad,
             extent_rad: revolutions * std::f64::consts::TAU,
             sense: conditions.direction.sign(),
-            first_sample: batch.first_sample + index as u64,
+            first_sample,
             began_ns,
             lost_before: self.lost,
         };
         self.status.phase = Phase::Record;
         self.analysis.begin(conditions);
-        self.write_state_at(arrived, began_ns, batch.first_sample + index as u64);
+        self.write_state_at(arrived, began_ns, first_sample);
     }
 
     fn end_run(&mut self, end_ns: u64, end_sample: u64) {
-        let Recording::Active { first_sample, began_ns, lost_before, .. } = self.recording else { return };
+        let Recording::Active { first_sample, began_ns, lost_before, extent_rad, .. } = self.recording else { return };
         let arrived = self.clock.now_ns();
-        self.recording = Recording::Done;
+        self.recording = Recording::Done { revolutions: (extent_rad / std::f64::consts::TAU).round() };
         self.status.phase = Phase::Approach;
         self.write_state_at(arrived, end_ns, end_sample);
         let lost = self.lost - lost_before;
@@ -464,7 +647,7 @@ impl Acquisition {
     }
 
     /// Writes samples `from..to` of a batch as a message of their own.
-    fn write_part(&self, batch: &Samples, first_ns: u64, arrived: u64, from: usize, to: usize) {
+    fn write_part(&self, batch: &Samples, [first_ns, number]: [u64; 2], arrived: u64, from: usize, to: usize) {
         if from == to {
             return;
         }
@@ -477,7 +660,7 @@ impl Acquisition {
         let message = AngleBatch {
             t0_ns,
             dt_ns: batch.dt_ns,
-            first_sample: batch.first_sample + from as u64,
+            first_sample: number + from as u64,
             input_base: self.inputs[from],
             output_base: self.outputs[from],
             input_delta: deltas(&batch.input_delta),

@@ -2,7 +2,8 @@
 
 use thiserror::Error;
 
-use crate::device::{DeviceError, UnknownDriver};
+use super::supervisor::{Event, State};
+use crate::device::{BusError, DeviceError, Part, UnknownDriver};
 use crate::link::LinkError;
 
 /// Why a run ends before its time.
@@ -41,6 +42,55 @@ pub enum Halt {
     Alarm {
         /// The drive's code.
         alarm: u16,
+    },
+    /// A pause was asked for and is due.
+    #[error("paused at the end of a revolution, as asked for")]
+    Paused,
+    /// The emergency stop was pressed.
+    #[error(
+        "the emergency stop was pressed (servo alarm {alarm:#06x}): remove the cause, release the button, then start or go on"
+    )]
+    EmergencyStop {
+        /// The drive's code.
+        alarm: u16,
+    },
+    /// No command reached the servo for longer than the lease.
+    #[error(
+        "no command reached the servo for {silent_s:.1} s, longer than the lease of {lease_s} s (sequence.lease_s): this program was suspended, or the computer is overloaded; the drive's watchdog has stopped the motor"
+    )]
+    LeaseExpired {
+        /// How long.
+        silent_s: f64,
+        /// The lease.
+        lease_s: f64,
+    },
+    /// Motion was asked for in a state that forbids it.
+    #[error("speed {speed_rpm} rpm was refused: the supervisor is in state {state:?}, in which nothing may turn")]
+    NotPermitted {
+        /// The speed that was asked for, rpm of the driver.
+        speed_rpm: f64,
+        /// The supervisor's state.
+        state: State,
+    },
+    /// A lost device did not come back.
+    #[error("{part} did not come back within {patience_s} s: {last}")]
+    NotBack {
+        /// Which.
+        part: Part,
+        /// How long was waited.
+        patience_s: f64,
+        /// What it said last.
+        last: String,
+    },
+    /// One run fails again and again.
+    #[error("run {run} was begun {attempts} times and never finished, last: {last}")]
+    Flapping {
+        /// Which run, from 1.
+        run: usize,
+        /// How often it was begun.
+        attempts: u32,
+        /// Why it ended last.
+        last: String,
     },
     /// The brake's driver has switched itself off.
     #[error(
@@ -90,4 +140,50 @@ pub enum Halt {
     /// The log cannot be written.
     #[error(transparent)]
     Log(#[from] riglog::LogError),
+    /// The campaign's journal cannot be written.
+    #[error(transparent)]
+    Journal(#[from] crate::campaign::CampaignError),
+}
+
+impl Halt {
+    /// What it means to the supervisor.
+    #[must_use]
+    pub fn event(&self) -> Event {
+        match self {
+            Self::Operator => Event::OperatorStop,
+            Self::Paused => Event::Finished,
+            Self::Limit { .. } => Event::Limit,
+            Self::EmergencyStop { .. } => Event::EmergencyStop,
+            Self::LeaseExpired { .. } => Event::LeaseExpired,
+            _ => match self.lost_part() {
+                Some(Part::Servo) => Event::ServoLost,
+                Some(Part::Brake) => Event::BrakeLost,
+                Some(Part::Counter) => Event::EncodersLost,
+                None => Event::Fault,
+            },
+        }
+    }
+
+    /// The device that does not answer any more, where that is the reason: it may come back.
+    #[must_use]
+    pub fn lost_part(&self) -> Option<Part> {
+        match self {
+            Self::Device(error) => lost_part(error),
+            Self::EncodersSilent { .. } => Some(Part::Counter),
+            Self::NotBack { part, .. } => Some(*part),
+            _ => None,
+        }
+    }
+}
+
+/// The device that an error says is gone; `None` for one that answers, but not as it should.
+#[must_use]
+pub fn lost_part(error: &DeviceError) -> Option<Part> {
+    match error {
+        DeviceError::Bus(
+            BusError::Silent { device, .. } | BusError::Damaged { device, .. } | BusError::HungUp { device, .. },
+        ) => Part::ALL.into_iter().find(|part| part.name() == *device),
+        DeviceError::Counter { .. } => Some(Part::Counter),
+        _ => None,
+    }
 }

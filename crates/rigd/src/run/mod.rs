@@ -1,13 +1,23 @@
 //! One run of the rig, from connecting to the finalised log.
 
 pub mod acquire;
+pub mod attend;
+pub mod brake_sweep;
 pub mod halt;
+pub mod job;
+pub mod keys;
+pub mod limits;
 pub mod progress;
+pub mod reconnect;
 pub mod recorder;
 pub mod rig;
 pub mod sequence;
 pub mod session;
+pub mod settle;
+pub mod space;
 pub mod stop;
+pub mod stopping;
+pub mod supervisor;
 
 use gearmodel::Direction;
 
@@ -24,4 +34,6 @@ pub struct Plan {
     pub revolutions: f64,
     /// Sampling, Hz.
     pub rate_hz: f64,
+    /// The operator accepts a drive that has no watchdog of its own.
+    pub accept_no_watchdog: bool,
 }

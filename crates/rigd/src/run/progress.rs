@@ -14,6 +14,7 @@ const PERIOD: Duration = Duration::from_millis(80);
 pub struct Progress {
     bar: ProgressBar,
     drawn: Option<Instant>,
+    note: String,
 }
 
 impl Progress {
@@ -27,7 +28,22 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template("{prefix:>9} [{bar:24}] {msg}") {
             bar.set_style(style.progress_chars("=> "));
         }
-        Self { bar, drawn: None }
+        Self { bar, drawn: None, note: String::new() }
+    }
+
+    /// Something to show before everything else: which run of how many, time left, a pause.
+    pub fn note(&mut self, note: impl Into<String>) {
+        self.note = note.into();
+        self.drawn = None;
+    }
+
+    /// Prints a line above the progress line; without a terminal, on stderr.
+    pub fn line(&self, text: &str) {
+        if self.bar.is_hidden() {
+            eprintln!("{text}");
+        } else {
+            self.bar.println(text);
+        }
     }
 
     /// Draws the rig as it stands.
@@ -47,8 +63,9 @@ impl Progress {
         };
         let backlash = latest.backlash_rad.map_or(String::new(), |backlash| format!("  backlash {}", angle(backlash)));
         let direction = rig.status.direction.map_or(String::new(), |direction| direction.to_string());
+        let note = if self.note.is_empty() { String::new() } else { format!("{}  ", self.note) };
         self.bar.set_message(format!(
-            "{direction} {recorded_revolutions:.2} rev  {:+.2} rpm  {:.1} N·m  {} samples  lost {}  {te}{backlash}",
+            "{note}{direction} {recorded_revolutions:.2} rev  {:+.2} rpm  {:.1} N·m  {} samples  lost {}  {te}{backlash}",
             latest.speed_rpm,
             rig.status.load_nm,
             rig.samples(),

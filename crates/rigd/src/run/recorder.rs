@@ -13,7 +13,10 @@ use std::time::{Duration, Instant};
 
 use riglog::proto::Level;
 use riglog::proto::{AngleBatch, Backlash, RigState, TransmissionError};
-use riglog::{EncoderMetadata, LogError, LogStatistics, LogWriter, RunMetadata, WriterOptions};
+use riglog::{EncoderMetadata, LogError, LogStatistics, MetadataMap, RotatingWriter, RunMetadata, WriterOptions};
+
+use super::space::{Space, SpaceWatch};
+use crate::profile::LogPolicy;
 
 /// Parcels that may wait for the recorder: half a minute and more at a parcel every [`PARCEL_AGE`].
 const QUEUE: usize = 4096;
@@ -39,6 +42,8 @@ pub enum Entry {
     Run(Box<RunMetadata>),
     /// Metadata `rig.encoders`.
     Encoders(EncoderMetadata),
+    /// Metadata of another name.
+    Metadata(&'static str, MetadataMap),
     /// An attachment: name, media type, content.
     Attachment(&'static str, &'static str, Vec<u8>),
 }
@@ -71,14 +76,19 @@ impl Recorder {
     ///
     /// # Errors
     /// [`LogError`] when the file cannot be made.
-    pub fn create(path: &Path, options: WriterOptions) -> Result<Self, LogError> {
-        let writer = LogWriter::create(path, options)?;
+    pub fn create(path: &Path, options: WriterOptions, policy: &LogPolicy) -> Result<Self, LogError> {
+        let mut watch = SpaceWatch::new(path, policy);
+        let first_look = watch.look();
+        if let Space::Short(error) = first_look {
+            return Err(error);
+        }
+        let writer = RotatingWriter::create(path, options, policy.rotation(), &uuid::Uuid::new_v4().to_string())?;
         let (queue, parcels) = sync_channel(QUEUE);
         let shared = Arc::new(Shared::default());
         let theirs = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("recorder".into())
-            .spawn(move || record(writer, &parcels, &theirs))
+            .spawn(move || record(writer, &parcels, &theirs, watch, first_look))
             .map_err(|source| LogError::Io { path: path.into(), action: "start the recorder's thread for", source })?;
         Ok(Self {
             path: path.into(),
@@ -142,8 +152,17 @@ impl Recorder {
     }
 }
 
-fn record(mut writer: LogWriter, parcels: &Receiver<Vec<Stamped>>, shared: &Shared) -> Result<LogStatistics, LogError> {
+fn record(
+    mut writer: RotatingWriter,
+    parcels: &Receiver<Vec<Stamped>>,
+    shared: &Shared,
+    mut watch: SpaceWatch,
+    first_look: Space,
+) -> Result<LogStatistics, LogError> {
+    let report = |error| *shared.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
     let mut failed = false;
+    let mut found = first_look;
+    let mut last_ns = 0;
     loop {
         let outcome = match parcels.recv_timeout(Duration::from_millis(50)) {
             Ok(parcel) if failed => {
@@ -152,6 +171,7 @@ fn record(mut writer: LogWriter, parcels: &Receiver<Vec<Stamped>>, shared: &Shar
             }
             Ok(parcel) => {
                 let mut left = parcel.len() as u64;
+                last_ns = parcel.last().map_or(last_ns, |stamped| stamped.log_time_ns);
                 let outcome = parcel.into_iter().try_for_each(|stamped| {
                     write(&mut writer, stamped)?;
                     left -= 1;
@@ -166,12 +186,28 @@ fn record(mut writer: LogWriter, parcels: &Receiver<Vec<Stamped>>, shared: &Shar
         };
         if let Err(error) = outcome {
             failed = true;
-            *shared.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            report(error);
+            continue;
+        }
+        // The log's own messages date what the disk says; before the first one there is no time to give it.
+        match std::mem::replace(&mut found, Space::Enough) {
+            Space::Enough => found = watch.look(),
+            unsaid if last_ns == 0 => found = unsaid,
+            Space::Low { warning } => {
+                tracing::warn!("{warning}");
+                // Refused, it is told with the next message.
+                let _ = writer.event(last_ns, last_ns, Level::Warning, "disk", &warning);
+            }
+            Space::Short(error) => {
+                let _ = writer.event(last_ns, last_ns, Level::Error, "disk", &error.to_string());
+                // The sequencer stops the rig; until then everything is written as before.
+                report(error);
+            }
         }
     }
 }
 
-fn write(writer: &mut LogWriter, stamped: Stamped) -> Result<(), LogError> {
+fn write(writer: &mut RotatingWriter, stamped: Stamped) -> Result<(), LogError> {
     let Stamped { log_time_ns, publish_time_ns, entry } = stamped;
     match entry {
         Entry::Angles(batch) => writer.angles(log_time_ns, publish_time_ns, &batch),
@@ -181,6 +217,7 @@ fn write(writer: &mut LogWriter, stamped: Stamped) -> Result<(), LogError> {
         Entry::Event(level, name, message) => writer.event(log_time_ns, publish_time_ns, level, name, &message),
         Entry::Run(run) => writer.run_metadata(&run),
         Entry::Encoders(encoders) => writer.encoders(&encoders),
+        Entry::Metadata(name, map) => writer.named_metadata(name, &map),
         Entry::Attachment(name, media_type, data) => writer.attach(log_time_ns, name, media_type, &data),
     }
 }

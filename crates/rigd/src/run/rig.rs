@@ -1,25 +1,36 @@
-//! The connected rig: three devices, their limits, and the order in which they are switched off.
+//! The connected rig: three devices, polled and supervised. What may turn is the supervisor's; how it stops is in `stopping.rs`.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
 use gearmodel::Direction;
-use riglog::proto::Level;
 use riglog::proto::Phase;
 use tokio::task::JoinHandle;
-use tokio::time::{Instant, MissedTickBehavior, sleep};
+use tokio::time::{Instant, MissedTickBehavior};
 
 use super::acquire::Acquisition;
-use super::halt::Halt;
+use super::halt::{Halt, lost_part};
+use super::limits::{self, HeatAccount, Observed};
 use super::progress::Progress;
+use super::reconnect::Dialer;
 use super::stop::StopRequests;
+use super::supervisor::{Event, State};
 use crate::clock::Clock;
-use crate::device::{Brake, Counter, DeviceError, Servo};
+use crate::device::{Brake, BrakeStatus, Counter, DeviceError, Part, Servo, ServoStatus};
 use crate::profile::Profile;
 
-/// Slower than this the shafts stand still, rpm of the driver.
-const STANDSTILL_RPM: f64 = 0.02;
+pub use super::limits::slip_power_w;
+
+/// The three drivers.
+pub struct Devices {
+    /// The servo drive.
+    pub servo: Box<dyn Servo>,
+    /// The brake's driver.
+    pub brake: Box<dyn Brake>,
+    /// The reader of the encoders.
+    pub counter: Box<dyn Counter>,
+}
 
 /// The connected rig.
 pub struct Rig {
@@ -33,24 +44,32 @@ pub struct Rig {
     pub acquisition: Rc<RefCell<Acquisition>>,
     /// The host's clock.
     pub clock: Clock,
-    /// The operator's wish to stop.
+    /// The operator's wish to stop or to pause.
     pub stop: StopRequests,
     /// The progress line.
     pub progress: Progress,
     /// Revolutions recorded by finished runs.
     pub finished_revolutions: f64,
-    stream: Option<Stream>,
+    /// The brake's heat above what it sheds.
+    pub heat: HeatAccount,
+    pub(super) state: State,
+    /// Connected, but not streaming.
+    pub(super) counter: Option<Box<dyn Counter>>,
+    pub(super) stream: Option<Stream>,
+    pub(super) dialer: Dialer,
+    /// Devices that do not answer, in the order of [`Part::ALL`].
+    pub(super) lost: [bool; 3],
     poll: tokio::time::Interval,
-    slip_heat_j: f64,
     heat_updated: Instant,
-    moving: bool,
+    /// When the servo last took a command.
+    pub(super) heard: Instant,
 }
 
 /// The task that reads the counter.
-struct Stream {
-    task: JoinHandle<()>,
-    failure: Rc<RefCell<Option<DeviceError>>>,
-    end: Rc<tokio::sync::Notify>,
+pub(super) struct Stream {
+    pub(super) task: JoinHandle<()>,
+    pub(super) failure: Rc<RefCell<Option<DeviceError>>>,
+    pub(super) end: Rc<tokio::sync::Notify>,
 }
 
 impl Rig {
@@ -58,8 +77,8 @@ impl Rig {
     #[must_use]
     pub fn new(
         profile: Profile,
-        servo: Box<dyn Servo>,
-        brake: Box<dyn Brake>,
+        devices: Devices,
+        dialer: Dialer,
         acquisition: Rc<RefCell<Acquisition>>,
         clock: Clock,
         stop: StopRequests,
@@ -69,19 +88,35 @@ impl Rig {
         poll.set_missed_tick_behavior(MissedTickBehavior::Delay);
         Self {
             profile,
-            servo,
-            brake,
+            servo: devices.servo,
+            brake: devices.brake,
+            counter: Some(devices.counter),
             acquisition,
             clock,
             stop,
             progress,
             finished_revolutions: 0.0,
+            heat: HeatAccount::default(),
+            state: State::Off,
             stream: None,
+            dialer,
+            lost: [false; 3],
             poll,
-            slip_heat_j: 0.0,
             heat_updated: Instant::now(),
-            moving: false,
+            heard: Instant::now(),
         }
+    }
+
+    /// What the supervisor allows.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// Tells the supervisor an event of starting or running; stops go through [`Rig::switch_off`], which performs their actions.
+    pub(super) fn tell(&mut self, event: Event) {
+        debug_assert!(!event.is_stop(), "{event:?} has actions");
+        self.state = self.state.on(event).0;
     }
 
     /// Reads the counter in a task of its own from now on, so that no Modbus transaction ever holds it up.
@@ -111,6 +146,20 @@ impl Rig {
         self.stream = Some(Stream { task, failure, end });
     }
 
+    /// Ends the counter's stream; what went wrong with that.
+    pub async fn end_stream(&mut self) -> Option<String> {
+        let mut stream = self.stream.take()?;
+        stream.end.notify_one();
+        // One batch is always on its way; a task that has ended does not wait.
+        if tokio::time::timeout(Duration::from_secs(2), &mut stream.task).await.is_ok() {
+            return None;
+        }
+        // It must not hold the acquisition any longer, for the log is finalised next.
+        stream.task.abort();
+        let _ = stream.task.await;
+        Some("counter did not acknowledge its stop".into())
+    }
+
     /// One poll: renews the lease, reads both drives, writes the state, and checks every limit.
     ///
     /// # Errors
@@ -118,6 +167,7 @@ impl Rig {
     pub async fn tick(&mut self) -> Result<(), Halt> {
         self.poll.tick().await;
         self.heed_stop()?;
+        self.check_lease()?;
         self.observe().await?;
         self.supervise()
     }
@@ -130,19 +180,61 @@ impl Rig {
         if self.stop.any() { Err(Halt::Operator) } else { Ok(()) }
     }
 
-    /// Reads both drives and writes the state.
-    async fn observe(&mut self) -> Result<(), Halt> {
-        let servo = self.servo.status().await?;
-        let lease_s = self.profile.sequence.lease_s;
-        let brake = keep_lease(self.servo.as_mut(), lease_s, self.brake.status()).await?;
+    /// A process that was frozen finds that its lease has run out: what it believed of the rig is old.
+    fn check_lease(&self) -> Result<(), Halt> {
+        let (silent_s, lease_s) = (self.heard.elapsed().as_secs_f64(), self.profile.sequence.lease_s);
+        let held = matches!(self.state, State::Standing | State::Turning);
+        if held && silent_s > lease_s { Err(Halt::LeaseExpired { silent_s, lease_s }) } else { Ok(()) }
+    }
+
+    /// Remembers whether a device answers.
+    pub(super) fn note<T>(&mut self, outcome: Result<T, DeviceError>) -> Result<T, Halt> {
+        if let Err(error) = &outcome
+            && let Some(part) = lost_part(error)
         {
-            let mut rig = self.acquisition.borrow_mut();
-            rig.status.servo_alarm = servo.alarm;
-            rig.status.brake_current_a = brake.current_a;
-            rig.status.brake_temperature_c = brake.temperature_c;
-            rig.status.load_nm = self.profile.brake.load_nm(brake.current_a);
+            self.lose(part);
+        }
+        Ok(outcome?)
+    }
+
+    pub(super) fn lose(&mut self, part: Part) {
+        self.lost[part as usize] = true;
+    }
+
+    /// Reads the servo, and renews its lease by that.
+    async fn servo_status(&mut self) -> Result<ServoStatus, Halt> {
+        let status = self.servo.status().await;
+        if status.is_ok() {
+            self.heard = Instant::now();
+        }
+        self.note(status)
+    }
+
+    /// Reads the brake's driver, and renews the servo's lease if that takes long.
+    pub(super) async fn brake_status(&mut self) -> Result<BrakeStatus, Halt> {
+        let lease_s = self.profile.sequence.lease_s;
+        let status = keep_lease(self.servo.as_mut(), &mut self.heard, lease_s, self.brake.status()).await;
+        let status = self.note(status)?;
+        let mut rig = self.acquisition.borrow_mut();
+        rig.status.brake_current_a = status.current_a;
+        rig.status.brake_temperature_c = status.temperature_c;
+        rig.status.load_nm = self.profile.brake.load_nm(status.current_a);
+        Ok(status)
+    }
+
+    /// Reads both drives and writes the state.
+    pub(super) async fn observe(&mut self) -> Result<(), Halt> {
+        let servo = self.servo_status().await?;
+        self.acquisition.borrow_mut().status.servo_alarm = servo.alarm;
+        let brake = self.brake_status().await?;
+        self.book_heat();
+        {
+            let rig = self.acquisition.borrow();
             rig.write_state();
             self.progress.show(&rig, self.finished_revolutions + rig.latest.revolutions);
+        }
+        if self.servo.is_emergency_stop(servo.alarm) {
+            return Err(Halt::EmergencyStop { alarm: servo.alarm });
         }
         if servo.alarm != 0 {
             return Err(Halt::Alarm { alarm: servo.alarm });
@@ -153,64 +245,56 @@ impl Rig {
         Ok(())
     }
 
-    fn supervise(&mut self) -> Result<(), Halt> {
-        let rig = self.acquisition.borrow();
-        if let Some(failure) = rig.recorder().take_failure() {
-            return Err(Halt::Log(failure));
-        }
-        if let Some(stream) = &self.stream {
-            if let Some(failure) = stream.failure.borrow_mut().take() {
-                return Err(Halt::Device(failure));
-            }
-            let silent_ms = self.clock.now_ns().saturating_sub(rig.latest.arrived_ns) as f64 * 1e-6;
-            let limit_ms = self.profile.limits.encoder_silence_ms;
-            if rig.latest.arrived_ns > 0 && silent_ms > limit_ms {
-                let port = self.profile.counter.port.clone();
-                return Err(Halt::EncodersSilent { port, silent_ms, limit_ms });
-            }
-        }
-        let limits = &self.profile.limits;
-        let over = |quantity, value: f64, limit: f64, unit, key, advice| {
-            if value > limit { Err(Halt::Limit { quantity, value, limit, unit, key, advice }) } else { Ok(()) }
-        };
-        // The ramp may overshoot a setpoint at the limit by a little.
-        over(
-            "driver speed",
-            rig.latest.speed_rpm.abs(),
-            limits.speed_rpm * 1.1,
-            "rpm",
-            "limits.speed_rpm, and a tenth",
-            "check servo.reduction and the drive's tuning",
-        )?;
-        over(
-            "brake temperature",
-            rig.status.brake_temperature_c,
-            limits.brake_temperature_c,
-            "°C",
-            "limits.brake_temperature_c",
-            "let the brake cool, or lower load or speed",
-        )?;
-        over(
-            "TE excursion",
-            rig.latest.excursion_rad * 1e3,
-            limits.te_excursion_mrad,
-            "mrad",
-            "limits.te_excursion_mrad",
-            "inspect the teeth before the next run",
-        )?;
-        // Heat account: what goes in above the continuous power leaves at the same rate; a minute's worth is the limit.
+    /// Books the slip since the last time.
+    pub(super) fn book_heat(&mut self) {
         let seconds = self.heat_updated.elapsed().as_secs_f64();
         self.heat_updated = Instant::now();
-        let power_w = slip_power_w(rig.status.load_nm, rig.latest.speed_rpm);
-        self.slip_heat_j = (self.slip_heat_j + (power_w - limits.slip_power_w) * seconds).max(0.0);
-        over(
-            "brake heat account",
-            self.slip_heat_j,
-            limits.slip_power_w * 60.0,
-            "J",
-            "60 s of limits.slip_power_w",
-            "lower load or speed, or pause between runs",
-        )
+        let rig = self.acquisition.borrow();
+        self.heat.book(&self.profile.limits, rig.status.load_nm, rig.latest.speed_rpm, seconds);
+    }
+
+    fn supervise(&mut self) -> Result<(), Halt> {
+        self.log_works()?;
+        self.encoders_live()?;
+        let observed = {
+            let rig = self.acquisition.borrow();
+            Observed {
+                speed_rpm: rig.latest.speed_rpm,
+                load_nm: rig.status.load_nm,
+                brake_temperature_c: rig.status.brake_temperature_c,
+                excursion_rad: rig.latest.excursion_rad,
+            }
+        };
+        limits::check(&self.profile.limits, &observed)?;
+        self.heat.check(&self.profile.limits)
+    }
+
+    /// The log is still being written.
+    pub(super) fn log_works(&self) -> Result<(), Halt> {
+        let rig = self.acquisition.borrow();
+        match rig.recorder().take_failure() {
+            Some(failure) => Err(Halt::Log(failure)),
+            None if rig.recorder().unwritten() > 0 => Err(Halt::Panic { what: "the recorder has ended".into() }),
+            None => Ok(()),
+        }
+    }
+
+    /// The encoders' stream is alive and fresh.
+    pub(super) fn encoders_live(&mut self) -> Result<(), Halt> {
+        let Some(stream) = &self.stream else { return Ok(()) };
+        let failure = stream.failure.borrow_mut().take();
+        if let Some(failure) = failure {
+            return self.note(Err(failure));
+        }
+        let arrived_ns = self.acquisition.borrow().latest.arrived_ns;
+        let silent_ms = self.clock.now_ns().saturating_sub(arrived_ns) as f64 * 1e-6;
+        let limit_ms = self.profile.limits.encoder_silence_ms;
+        if arrived_ns > 0 && silent_ms > limit_ms {
+            self.lose(Part::Counter);
+            let port = self.profile.counter.port.clone();
+            return Err(Halt::EncodersSilent { port, silent_ms, limit_ms });
+        }
+        Ok(())
     }
 
     /// Polls until `done`; an error when it takes longer than `seconds`.
@@ -221,13 +305,13 @@ impl Rig {
         &mut self,
         what: &'static str,
         seconds: f64,
-        mut done: impl FnMut(&Acquisition) -> bool,
+        mut done: impl FnMut(&mut Acquisition) -> bool,
     ) -> Result<(), Halt> {
         let deadline = Instant::now() + Duration::from_secs_f64(seconds);
         loop {
             self.tick().await?;
-            let rig = self.acquisition.borrow();
-            if done(&rig) {
+            let mut rig = self.acquisition.borrow_mut();
+            if done(&mut rig) {
                 return Ok(());
             }
             if Instant::now() > deadline {
@@ -256,11 +340,17 @@ impl Rig {
         rig.write_state();
     }
 
-    /// Speed setpoint of the driver, rpm, + = ccw.
+    /// Speed setpoint of the driver, rpm, + = ccw; any but 0 only where the supervisor allows motion.
     ///
     /// # Errors
-    /// [`Halt::Device`].
+    /// [`Halt::NotPermitted`], [`Halt::Device`].
     pub async fn set_speed(&mut self, direction: Option<Direction>, speed_rpm: f64) -> Result<(), Halt> {
+        if speed_rpm != 0.0 {
+            self.tell(Event::Motion);
+            if self.state != State::Turning {
+                return Err(Halt::NotPermitted { speed_rpm, state: self.state });
+            }
+        }
         {
             let mut rig = self.acquisition.borrow_mut();
             rig.status.speed_setpoint_rpm = speed_rpm;
@@ -268,20 +358,45 @@ impl Rig {
                 rig.status.direction = direction;
             }
         }
-        self.moving |= speed_rpm != 0.0;
         let sense = direction.map_or(0.0, Direction::sign) * f64::from(self.profile.servo.sense);
-        Ok(self.servo.set_motor_rpm(sense * speed_rpm * self.profile.servo.reduction).await?)
+        let set = self.servo.set_motor_rpm(sense * speed_rpm * self.profile.servo.reduction).await;
+        if set.is_ok() {
+            self.heard = Instant::now();
+        }
+        self.note(set)
     }
 
-    /// Load setpoint at the driven gear, N·m, by the brake's rising branch: from no current upwards.
+    /// Load setpoint at the driven gear, N·m, by the branch of the brake's curve on which the current then lies.
     ///
     /// # Errors
     /// [`Halt::Device`].
     pub async fn set_load(&mut self, load_nm: f64) -> Result<(), Halt> {
-        self.acquisition.borrow_mut().status.load_setpoint_nm = load_nm;
-        let current = self.profile.brake.current_a(load_nm).unwrap_or(0.0);
+        let from_a = {
+            let mut rig = self.acquisition.borrow_mut();
+            rig.status.load_setpoint_nm = load_nm;
+            rig.status.brake_current_a
+        };
+        let current = self.profile.brake.current_from_a(load_nm, from_a).unwrap_or(0.0);
+        self.set_coil_current(current).await
+    }
+
+    /// Current of the brake's coil, A: for its calibration, which has no curve yet.
+    ///
+    /// # Errors
+    /// [`Halt::Device`].
+    pub async fn set_coil_current(&mut self, current_a: f64) -> Result<(), Halt> {
         let lease_s = self.profile.sequence.lease_s;
-        Ok(keep_lease(self.servo.as_mut(), lease_s, self.brake.set_current_a(current)).await?)
+        let set = self.brake.set_current_a(current_a);
+        let set = keep_lease(self.servo.as_mut(), &mut self.heard, lease_s, set).await;
+        self.note(set)
+    }
+
+    /// Brake to zero current, output off.
+    pub(super) async fn release_brake(&mut self) -> Result<(), Halt> {
+        self.acquisition.borrow_mut().status.load_setpoint_nm = 0.0;
+        let lease_s = self.profile.sequence.lease_s;
+        let released = keep_lease(self.servo.as_mut(), &mut self.heard, lease_s, self.brake.release()).await;
+        self.note(released)
     }
 
     /// Time that the drive needs from one driver speed to another, and a little, s.
@@ -290,111 +405,20 @@ impl Rig {
         let servo = &self.profile.servo;
         1.0 + 1.5 * speed_rpm.abs() * servo.reduction / 3000.0 * servo.accel_ms.max(servo.decel_ms) * 1e-3
     }
-
-    /// Switches off in the safe order: ramp to 0 under load, standstill by the encoders, brake to 0, servo off.
-    ///
-    /// Every step is tried whatever became of the one before. `hurried` skips the ramp. Returns what went wrong on the way.
-    pub async fn switch_off(&mut self, hurried: bool) -> Vec<String> {
-        let mut troubles = Vec::new();
-        self.acquisition.borrow_mut().abandon();
-        self.enter(Phase::Stopping);
-        let servo_lost = match self.set_speed(None, 0.0).await {
-            Ok(()) => false,
-            Err(error) => {
-                troubles.push(format!("speed 0 was not accepted: {error}"));
-                true
-            }
-        };
-        let mut still = !self.moving;
-        if self.moving && !hurried {
-            still = self.await_standstill(servo_lost, &mut troubles).await;
-        }
-        if servo_lost && !still {
-            // The brake holds what the servo no longer does; only a person can take the power away.
-            troubles.push("the servo does not answer and the shaft may turn: the brake keeps its load; press the emergency stop and switch the drive off by hand".into());
-        } else {
-            self.acquisition.borrow_mut().status.load_setpoint_nm = 0.0;
-            let lease_s = self.profile.sequence.lease_s;
-            if let Err(error) = keep_lease(self.servo.as_mut(), lease_s, self.brake.release()).await {
-                troubles.push(format!("brake was not switched off: {error}; switch it off at its panel"));
-            }
-        }
-        match self.servo.set_enabled(false).await {
-            Err(error) if !servo_lost => {
-                troubles.push(format!("servo was not switched off: {error}; switch it off by hand"));
-            }
-            Err(_) if still && self.moving => troubles.push(
-                "the shafts stand still, but the servo does not answer and may be on: switch the drive off by hand before you touch the rig".into(),
-            ),
-            _ => {}
-        }
-        if let Some(mut stream) = self.stream.take() {
-            stream.end.notify_one();
-            // One batch is always on its way; a task that has ended does not wait.
-            if tokio::time::timeout(Duration::from_secs(2), &mut stream.task).await.is_err() {
-                troubles.push("counter did not acknowledge its stop".into());
-                // It must not hold the acquisition any longer, for the log is finalised next.
-                stream.task.abort();
-                let _ = stream.task.await;
-            }
-        }
-        self.enter(Phase::Idle);
-        troubles
-    }
-
-    /// Waits until the encoders say that the shafts stand still.
-    async fn await_standstill(&mut self, servo_lost: bool, troubles: &mut Vec<String>) -> bool {
-        let speed = self.acquisition.borrow().latest.speed_rpm;
-        // A drive that lost its master ramps down when its watchdog elapses.
-        let lease = if servo_lost { self.profile.sequence.lease_s } else { 0.0 };
-        let deadline = Instant::now() + Duration::from_secs_f64(self.ramp_s(speed) + lease + 1.0);
-        loop {
-            if let Err(error) = self.observe().await {
-                tracing::debug!("while stopping: {error}");
-            }
-            sleep(self.profile.poll_period()).await;
-            let rig = self.acquisition.borrow();
-            let fresh = self.clock.now_ns().saturating_sub(rig.latest.arrived_ns) < 300_000_000;
-            if fresh && rig.latest.speed_rpm.abs() < STANDSTILL_RPM {
-                return true;
-            }
-            if self.stop.hurried() {
-                troubles.push("the ramp was skipped at the operator's second request".into());
-                return false;
-            }
-            if Instant::now() > deadline {
-                let reason = if fresh {
-                    format!("the driver still turns at {:.3} rpm", rig.latest.speed_rpm)
-                } else {
-                    "the encoders are silent".into()
-                };
-                troubles.push(format!("standstill could not be confirmed: {reason}"));
-                rig.event(Level::Error, "stop", "standstill could not be confirmed".into());
-                return false;
-            }
-        }
-    }
 }
 
 /// Waits for `work` on another device and renews the servo's lease meanwhile: a device that no longer answers takes its
 /// time-outs, and the servo shall be stopped by its ramp, not by its watchdog.
-async fn keep_lease<T>(servo: &mut dyn Servo, lease_s: f64, work: impl Future<Output = T>) -> T {
+async fn keep_lease<T>(servo: &mut dyn Servo, heard: &mut Instant, lease_s: f64, work: impl Future<Output = T>) -> T {
     let mut work = std::pin::pin!(work);
     loop {
         // Half of the lease is left for the transaction that renews it.
         match tokio::time::timeout(Duration::from_secs_f64(0.5 * lease_s), &mut work).await {
             Ok(done) => return done,
-            Err(_) => {
-                if let Err(error) = servo.status().await {
-                    tracing::debug!("while another device is awaited: {error}");
-                }
-            }
+            Err(_) => match servo.status().await {
+                Ok(_) => *heard = Instant::now(),
+                Err(error) => tracing::debug!("while another device is awaited: {error}"),
+            },
         }
     }
-}
-
-/// Power that the brake turns into heat: W = T·ω of the driven gear; its mean speed is the driver's.
-#[must_use]
-pub fn slip_power_w(load_nm: f64, speed_rpm: f64) -> f64 {
-    load_nm * speed_rpm.abs() * std::f64::consts::TAU / 60.0
 }

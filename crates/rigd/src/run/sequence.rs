@@ -1,4 +1,4 @@
-//! The sequence of a run: prepare → home → for each load and sense: approach, settle, record → switch off.
+//! The sequence of a job: prepare → home → for each run: approach, settle, record. The caller switches off.
 
 use std::time::Duration;
 
@@ -7,84 +7,154 @@ use gearmodel::measure::RunConditions;
 use riglog::proto::Level;
 use riglog::proto::Phase;
 
-use super::Plan;
+use super::attend::Attendant;
 use super::halt::Halt;
+use super::job::{Job, Kind, RunSpec, Settle};
 use super::rig::Rig;
-use crate::device::{Counter, DeviceError};
+use super::settle::SettleMonitor;
+use super::supervisor::Event;
+use crate::device::{CounterIdentity, DeviceError};
 
 /// Room on a serial line for a sample of both encoders: two bytes each at speed, and the frame's share.
 const BYTES_A_SAMPLE: f64 = 5.0;
 
-/// Runs the plan on a connected rig. The caller switches off afterwards, whatever came back.
+/// Runs what is left of the job on a rig that is off. The caller switches off afterwards, whatever came back.
 ///
 /// # Errors
-/// [`Halt`] says why the plan was not finished.
-pub async fn execute(rig: &mut Rig, counter: Box<dyn Counter>, plan: &Plan) -> Result<(), Halt> {
-    prepare(rig, counter, plan).await?;
+/// [`Halt`] says why the job was not finished; [`Halt::Paused`] when a pause is due.
+pub async fn execute(rig: &mut Rig, job: &mut Job, attendant: &mut dyn Attendant) -> Result<(), Halt> {
+    prepare(rig, job).await?;
     home(rig).await?;
-    for &load_nm in &plan.loads_nm {
-        for &direction in &plan.directions {
-            approach(rig, plan, direction, load_nm).await?;
-            record(rig, plan, direction, load_nm).await?;
+    while let Some((index, run)) = job.current() {
+        heed_pause(rig)?;
+        if !job.is_partial() {
+            attendant.begins(rig, index, &run).await?;
+        }
+        approach(rig, &run, job.settle).await?;
+        heed_pause(rig)?;
+        let complete = if run.kind == Kind::WarmUp {
+            warm_up(rig, &run).await?;
+            true
+        } else {
+            let recorded = record(rig, &run, job.missing_revolutions()).await?;
+            job.book(recorded)
+        };
+        if complete {
+            job.advance();
+            attendant.ended(rig, index, &run).await?;
         }
     }
     Ok(())
 }
 
-/// Identifies the devices, starts the encoders, and arms the drive's watchdog before it is enabled.
-async fn prepare(rig: &mut Rig, mut counter: Box<dyn Counter>, plan: &Plan) -> Result<(), Halt> {
-    rig.enter(Phase::Idle);
-    let servo = rig.servo.identify().await?;
-    let brake = rig.brake.identify().await?;
-    let encoders = counter.identify().await?;
-    {
-        let mut acquisition = rig.acquisition.borrow_mut();
-        let signs = [rig.profile.counter.input_sign, rig.profile.counter.output_sign];
-        acquisition.set_encoders(&encoders, signs);
-        acquisition.event(
-            Level::Info,
-            "identity",
-            format!("servo {}; brake {}; counter {}", servo.text, brake.text, encoders.text),
-        );
-    }
-    refuse_over_limit(rig, &encoders, plan).await?;
-    counter.start(plan.rate_hz).await?;
-    rig.stream_from(counter);
-    rig.brake.prepare(rig.profile.brake.voltage_v).await?;
-    // Last, for the drive's watchdog runs from here on.
-    let lease_s = rig.profile.sequence.lease_s;
-    let (accel, decel) = (rig.profile.servo.accel_ms, rig.profile.servo.decel_ms);
-    rig.servo.prepare(accel, decel, Duration::from_secs_f64(lease_s)).await?;
-    rig.acquisition.borrow().event(
-        Level::Info,
-        "lease",
-        format!("the drive's watchdog is armed and read back: it stops the motor {lease_s} s after the last request"),
-    );
-    rig.servo.set_motor_rpm(0.0).await?;
-    rig.heed_stop()?;
-    rig.servo.set_enabled(true).await?;
-    rig.until("the first encoder samples", 2.0, |acquisition| acquisition.samples() > 0).await
+fn heed_pause(rig: &Rig) -> Result<(), Halt> {
+    if rig.stop.paused() { Err(Halt::Paused) } else { Ok(()) }
 }
 
-/// What the devices themselves allow, read back from them.
-async fn refuse_over_limit(rig: &mut Rig, encoders: &crate::device::CounterIdentity, plan: &Plan) -> Result<(), Halt> {
-    let range = |device, port: &str, quantity, value: f64, limit: f64, unit| {
-        if value <= limit {
-            return Ok(());
-        }
-        Err(Halt::Device(DeviceError::Range { device, port: port.to_owned(), quantity, value, limit, unit }))
+/// Identifies the devices, starts the encoders, and arms the drive's watchdog before it is enabled.
+///
+/// # Errors
+/// [`Halt`], among them [`DeviceError::NoWatchdog`] for a drive that has none.
+pub async fn prepare(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
+    rig.enter(Phase::Idle);
+    let servo = rig.servo.identify().await;
+    let servo = rig.note(servo)?;
+    let brake = rig.brake.identify().await;
+    let brake = rig.note(brake)?;
+    let event = |rig: &Rig, text: String| rig.acquisition.borrow().event(Level::Info, "identity", text);
+    refuse_over_limit(rig, job).await?;
+    // A counter that has gone on streaming while the rig was off is left alone.
+    if let Some(mut counter) = rig.counter.take() {
+        let encoders = counter.identify().await;
+        let encoders = rig.note(encoders)?;
+        let signs = [rig.profile.counter.input_sign, rig.profile.counter.output_sign];
+        rig.acquisition.borrow_mut().set_encoders(&encoders, signs, &rig.profile.counter.port)?;
+        let mounted_deg = [rig.profile.counter.input_mounted_deg, rig.profile.counter.output_mounted_deg];
+        rig.acquisition.borrow_mut().set_mounting(mounted_deg);
+        event(rig, format!("servo {}; brake {}; counter {}", servo.text, brake.text, encoders.text));
+        refuse_rate(rig, &encoders, job.rate_hz)?;
+        let started = counter.start(job.rate_hz).await;
+        rig.note(started)?;
+        rig.stream_from(counter);
+    } else {
+        event(rig, format!("servo {}; brake {}", servo.text, brake.text));
+    }
+    let prepared = rig.brake.prepare(rig.profile.brake.voltage_v).await;
+    rig.note(prepared)?;
+    // Last, for the drive's watchdog runs from here on.
+    arm_watchdog(rig, job.accept_no_watchdog).await?;
+    rig.heard = tokio::time::Instant::now();
+    rig.set_speed(None, 0.0).await?;
+    rig.heed_stop()?;
+    let enabled = rig.servo.set_enabled(true).await;
+    // It may be on even where that could not be confirmed; a stop then takes the longer way.
+    rig.tell(Event::ServoOn);
+    rig.note(enabled)?;
+    // Switching on takes its time and asks the drive all along.
+    rig.heard = tokio::time::Instant::now();
+    let before = rig.acquisition.borrow().samples();
+    rig.until("the first encoder samples", 2.0, |acquisition| acquisition.samples() > before).await
+}
+
+/// Writes the drive's own watchdog and reads it back. A drive that has none is refused unless the operator accepts that.
+async fn arm_watchdog(rig: &mut Rig, accept_none: bool) -> Result<(), Halt> {
+    let lease_s = rig.profile.sequence.lease_s;
+    let (accel, decel) = (rig.profile.servo.accel_ms, rig.profile.servo.decel_ms);
+    let prepared = rig.servo.prepare(accel, decel, Duration::from_secs_f64(lease_s)).await;
+    let (level, what) = match prepared {
+        Ok(()) => (
+            Level::Info,
+            format!(
+                "the drive's watchdog is armed and read back: it stops the motor {lease_s} s after the last request"
+            ),
+        ),
+        Err(error @ DeviceError::NoWatchdog { .. }) if accept_none => (
+            Level::Warning,
+            format!(
+                "ACCEPTED WITHOUT A WATCHDOG by --accept-no-watchdog: {error}. Stay at the emergency stop while it turns"
+            ),
+        ),
+        other => return rig.note(other),
     };
-    let allowed = rig.servo.max_motor_rpm().await?;
-    let asked = plan.speed_rpm.max(rig.profile.sequence.home_rpm) * rig.profile.servo.reduction;
-    range("servo", &rig.profile.servo.port, "motor speed", asked, allowed, "rpm")?;
-    let current = plan.loads_nm.iter().filter_map(|load| rig.profile.brake.current_a(*load)).fold(0.0, f64::max);
-    range("brake", &rig.profile.brake.port, "coil current", current, rig.brake.max_current_a(), "A")?;
+    if level == Level::Warning {
+        tracing::warn!("{what}");
+    }
+    rig.acquisition.borrow().event(level, "lease", what);
+    rig.tell(Event::WatchdogKnown);
+    Ok(())
+}
+
+fn within(
+    device: &'static str,
+    port: &str,
+    quantity: &'static str,
+    value: f64,
+    limit: f64,
+    unit: &'static str,
+) -> Result<(), Halt> {
+    if value <= limit {
+        return Ok(());
+    }
+    Err(Halt::Device(DeviceError::Range { device, port: port.to_owned(), quantity, value, limit, unit }))
+}
+
+/// What the drives themselves allow, read back from them.
+async fn refuse_over_limit(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
+    let allowed = rig.servo.max_motor_rpm().await;
+    let allowed = rig.note(allowed)?;
+    let asked = job.largest_speed_rpm().max(rig.profile.sequence.home_rpm) * rig.profile.servo.reduction;
+    within("servo", &rig.profile.servo.port, "motor speed", asked, allowed, "rpm")?;
+    let current = rig.profile.brake.current_a(job.largest_load_nm()).unwrap_or(0.0);
+    within("brake", &rig.profile.brake.port, "coil current", current, rig.brake.max_current_a(), "A")
+}
+
+fn refuse_rate(rig: &Rig, encoders: &CounterIdentity, rate_hz: f64) -> Result<(), Halt> {
     let counter = &rig.profile.counter;
-    range("counter", &counter.port, "sample rate", plan.rate_hz, encoders.max_rate_hz, "Hz")?;
+    within("counter", &counter.port, "sample rate", rate_hz, encoders.max_rate_hz, "Hz")?;
     // A serial line carries a tenth of its baud rate in bytes; sockets and pipes have no such bound.
     if counter.port.starts_with('/') {
         let limit = f64::from(counter.baud) / 10.0 / BYTES_A_SAMPLE;
-        range("counter", &counter.port, "sample rate over its line", plan.rate_hz, limit, "Hz")?;
+        within("counter", &counter.port, "sample rate over its line", rate_hz, limit, "Hz")?;
     }
     Ok(())
 }
@@ -99,7 +169,7 @@ async fn home(rig: &mut Rig) -> Result<(), Halt> {
     // Both indices pass within one turn of either gear; a half more forgives the ramp.
     let patience =
         rig.ramp_s(speed) + 60.0 / speed * 1.5 / rig.acquisition.borrow().analysis().model().pair.closure().min(1.0);
-    let outcome = rig.until("homing", patience, super::acquire::Acquisition::index_seen).await;
+    let outcome = rig.until("homing", patience, |acquisition| acquisition.index_seen()).await;
     if let Err(halt) = outcome {
         let missing = rig.acquisition.borrow().missing_index();
         return Err(match (halt, missing) {
@@ -112,9 +182,9 @@ async fn home(rig: &mut Rig) -> Result<(), Halt> {
 }
 
 /// Reverses if need be, brings the load up on the rising branch at speed, and waits until both stand.
-async fn approach(rig: &mut Rig, plan: &Plan, direction: Direction, load_nm: f64) -> Result<(), Halt> {
+async fn approach(rig: &mut Rig, run: &RunSpec, settle: Option<Settle>) -> Result<(), Halt> {
     rig.enter(Phase::Approach);
-    let sense = direction.sign();
+    let sense = run.direction.sign();
     let signed = move |speed: f64| speed * sense;
     let turning = rig.acquisition.borrow().latest.speed_rpm;
     if signed(turning) < 0.0 {
@@ -125,12 +195,12 @@ async fn approach(rig: &mut Rig, plan: &Plan, direction: Direction, load_nm: f64
     // From no current upwards, so that the torque lies on the branch that was calibrated.
     rig.set_load(0.0).await?;
     rig.hold(rig.profile.sequence.load_s).await?;
-    rig.set_speed(Some(direction), plan.speed_rpm).await?;
-    let speed = plan.speed_rpm;
+    rig.set_speed(Some(run.direction), run.speed_rpm).await?;
+    let speed = run.speed_rpm;
     let patience = rig.ramp_s(speed) + 2.0;
     rig.until("the ramp to speed", patience, move |a| (signed(a.latest.speed_rpm) - speed).abs() < 0.05 * speed)
         .await?;
-    rig.set_load(load_nm).await?;
+    rig.set_load(run.load_nm).await?;
     rig.hold(rig.profile.sequence.load_s).await?;
 
     rig.enter(Phase::Settle);
@@ -138,17 +208,66 @@ async fn approach(rig: &mut Rig, plan: &Plan, direction: Direction, load_nm: f64
     rig.hold(rig.profile.sequence.settle_s).await?;
     let turns = rig.profile.sequence.settle_turns * std::f64::consts::TAU;
     let patience = 60.0 / speed * (rig.profile.sequence.settle_turns + 0.5);
-    rig.until("settling", patience, move |a| signed(a.latest.theta1_rad - from) >= turns).await
+    rig.until("settling", patience, move |a| signed(a.latest.theta1_rad - from) >= turns).await?;
+    match settle.filter(|_| run.kind != Kind::WarmUp) {
+        Some(settle) => settle_by_measurement(rig, run, settle).await,
+        None => Ok(()),
+    }
 }
 
-/// Records whole revolutions.
-async fn record(rig: &mut Rig, plan: &Plan, direction: Direction, load_nm: f64) -> Result<(), Halt> {
-    let conditions = RunConditions { direction, load_nm, speed_rpm: plan.speed_rpm };
-    rig.acquisition.borrow_mut().arm(conditions, plan.revolutions);
-    let patience = 60.0 / plan.speed_rpm * (plan.revolutions + 0.2) * 1.2 + 2.0;
-    rig.until("recording", patience, super::acquire::Acquisition::recorded).await?;
-    let mut acquisition = rig.acquisition.borrow_mut();
-    rig.finished_revolutions += plan.revolutions;
-    acquisition.latest.revolutions = 0.0;
+/// Waits until TE repeats from revolution to revolution, or the patience of the plan is over; the log says which.
+async fn settle_by_measurement(rig: &mut Rig, run: &RunSpec, settle: Settle) -> Result<(), Halt> {
+    let from = rig.acquisition.borrow().latest.theta1_rad;
+    let mut monitor = SettleMonitor::new(settle, from);
+    let longest = settle.turns_max * std::f64::consts::TAU;
+    let patience = 60.0 / run.speed_rpm * (settle.turns_max + 0.5) * 1.2 + 2.0;
+    let stop = rig.stop.clone();
+    rig.until("settling by measurement", patience, |acquisition| {
+        let latest = &acquisition.latest;
+        monitor.push(latest.theta1_rad, latest.residual_rad);
+        monitor.is_stable() || stop.paused() || (latest.theta1_rad - from).abs() >= longest
+    })
+    .await?;
+    let rig = rig.acquisition.borrow();
+    let turns = (rig.latest.theta1_rad - from).abs() / std::f64::consts::TAU;
+    let change = monitor.change_rad().map_or("unknown".into(), |change| format!("{:.2} µrad", change * 1e6));
+    let (level, verdict) = if monitor.is_stable() {
+        (Level::Info, "settled")
+    } else {
+        (Level::Warning, "NOT settled, recorded all the same")
+    };
+    rig.event(level, "settle", format!("{verdict} after {turns:.2} turns: TE changes by {change} a revolution"));
     Ok(())
+}
+
+/// Turns under load without recording.
+async fn warm_up(rig: &mut Rig, run: &RunSpec) -> Result<(), Halt> {
+    let from = rig.acquisition.borrow().latest.theta1_rad;
+    let turns = run.revolutions * std::f64::consts::TAU;
+    let patience = 60.0 / run.speed_rpm * (run.revolutions + 0.2) * 1.2 + 2.0;
+    let stop = rig.stop.clone();
+    rig.until("warming up", patience, move |a| stop.paused() || (a.latest.theta1_rad - from).abs() >= turns).await?;
+    // An interrupted warm-up is done again, for meanwhile the rig has cooled.
+    heed_pause(rig)
+}
+
+/// Records whole revolutions: as many as are wanted, or up to the end of the one in which a pause was asked for.
+async fn record(rig: &mut Rig, run: &RunSpec, revolutions: f64) -> Result<f64, Halt> {
+    let conditions = RunConditions { direction: run.direction, load_nm: run.load_nm, speed_rpm: run.speed_rpm };
+    rig.acquisition.borrow_mut().arm(conditions, revolutions);
+    let patience = 60.0 / run.speed_rpm * (revolutions + 0.2) * 1.2 + 2.0;
+    let stop = rig.stop.clone();
+    let mut asked = false;
+    rig.until("recording", patience, |acquisition| {
+        if stop.paused() && !std::mem::replace(&mut asked, true) {
+            acquisition.end_with_revolution();
+        }
+        acquisition.recorded()
+    })
+    .await?;
+    let mut acquisition = rig.acquisition.borrow_mut();
+    let recorded = acquisition.recorded_revolutions();
+    rig.finished_revolutions += recorded;
+    acquisition.latest.revolutions = 0.0;
+    Ok(recorded)
 }

@@ -1,6 +1,7 @@
 //! A session: open the log, connect, run the plan, switch off, finalise, and say what came of it.
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -8,22 +9,26 @@ use std::task::Poll;
 
 use gearmodel::NominalModel;
 use nix::libc::SIGXFSZ;
-use riglog::proto::Level;
+use riglog::proto::{Level, Phase};
 use riglog::{LogError, RunMetadata, WriterOptions};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use super::Plan;
 use super::acquire::Acquisition;
+use super::attend::{Attendant, Nobody, Policy, attend};
 use super::halt::Halt;
+use super::job::Job;
 use super::progress::Progress;
+use super::reconnect::{Dialer, Redial};
 use super::recorder::{Entry, Recorder};
-use super::rig::Rig;
-use super::sequence;
+use super::rig::{Devices, Rig};
 use super::stop::StopRequests;
+use super::supervisor::Event;
 use crate::analysis::Analysis;
 use crate::clock::Clock;
-use crate::device::{self, Brake, Counter, Servo, UnknownDriver};
-use crate::link::{Address, Link, LinkError};
+use crate::device::bus::BusStatistics;
+use crate::device::{self, UnknownDriver};
+use crate::link::Link;
 use crate::profile::Profile;
 
 /// This program, as logs name it.
@@ -47,6 +52,8 @@ pub struct Setup {
     pub note: String,
     /// No progress line.
     pub quiet: bool,
+    /// What is waited for instead of ending.
+    pub policy: Policy,
 }
 
 /// What came of a session.
@@ -61,6 +68,10 @@ pub struct Outcome {
     pub lost: u64,
     /// Entries that could not be written.
     pub unwritten: u64,
+    /// The last log was written to its end.
+    pub finalised: bool,
+    /// What happened on each device's line.
+    pub lines: BTreeMap<&'static str, BusStatistics>,
 }
 
 /// The links to the three devices; `None` where the profile's port is to be opened.
@@ -72,13 +83,8 @@ pub struct Links {
     pub brake: Option<Link>,
     /// To the counter.
     pub counter: Option<Link>,
-}
-
-/// The three drivers.
-struct Devices {
-    servo: Box<dyn Servo>,
-    brake: Box<dyn Brake>,
-    counter: Box<dyn Counter>,
+    /// Makes them another time, where devices are emulated within this process.
+    pub again: Option<Redial>,
 }
 
 /// Runs a session. Only what prevents the log itself is an error; everything later is in the outcome.
@@ -86,44 +92,93 @@ struct Devices {
 /// # Errors
 /// [`LogError`] when the log cannot be made.
 pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -> Result<Outcome, LogError> {
-    let recorder = Recorder::create(
-        &setup.path,
-        WriterOptions {
-            chunk_period_ms: setup.profile.log.chunk_ms,
-            sync_period_ms: setup.profile.log.sync_ms,
-            ..WriterOptions::new(SOFTWARE)
-        },
-    )?;
-    let _size_limit = outlive_size_limit();
-    describe(&recorder, &setup, clock);
-    let analysis = Analysis::new(setup.model.clone());
-    let acquisition = Rc::new(RefCell::new(Acquisition::new(recorder, clock, analysis)));
-    let total = setup.plan.revolutions * (setup.plan.loads_nm.len() * setup.plan.directions.len()) as f64;
-    let progress = Progress::new(total, setup.quiet);
+    let recorder = Recorder::create(&setup.path, writer_options(&setup.profile), &setup.profile.log)?;
+    let log = LogHead {
+        operator: setup.operator.clone(),
+        note: setup.note.clone(),
+        pair_toml: setup.pair_toml.clone(),
+        plan_toml: None,
+    };
+    let directions: Vec<_> = setup.plan.directions.iter().map(ToString::to_string).collect();
+    let conditions = RunMetadata {
+        direction: directions.join(","),
+        load_nm: setup.plan.loads_nm.clone(),
+        speed_rpm: vec![setup.plan.speed_rpm],
+        revolutions: Some(setup.plan.revolutions),
+        ..RunMetadata::default()
+    };
+    log.describe(&recorder, &setup.profile, conditions, clock);
+    let work = Work {
+        profile: setup.profile,
+        model: setup.model,
+        job: Job::of(&setup.plan),
+        policy: setup.policy,
+        quiet: setup.quiet,
+    };
+    Ok(conduct(work, recorder, &mut Nobody, links, clock, stop).await)
+}
 
-    let (halt, mut troubles) = match connect(&setup.profile, links).await {
+/// A job and the rig to do it on.
+pub struct Work {
+    /// The rig.
+    pub profile: Profile,
+    /// The model in force.
+    pub model: NominalModel,
+    /// The runs.
+    pub job: Job,
+    /// What is waited for instead of ending.
+    pub policy: Policy,
+    /// No progress line.
+    pub quiet: bool,
+}
+
+/// Connects, does the job, switches off, and finalises the log that is then being written.
+pub async fn conduct(
+    work: Work,
+    recorder: Recorder,
+    attendant: &mut dyn Attendant,
+    links: Links,
+    clock: Clock,
+    stop: StopRequests,
+) -> Outcome {
+    let Work { profile, model, mut job, policy, quiet } = work;
+    let progress = Progress::new(job.revolutions(), quiet);
+    let frame = Frame { profile, model, recorder, progress, links, clock, stop };
+    with_rig(frame, async |rig| attend(rig, &mut job, policy, attendant).await).await
+}
+
+/// What a session on the rig needs, whatever is done in it.
+pub struct Frame {
+    /// The rig.
+    pub profile: Profile,
+    /// The model in force.
+    pub model: NominalModel,
+    /// The log.
+    pub recorder: Recorder,
+    /// The progress line.
+    pub progress: Progress,
+    /// The links to the devices.
+    pub links: Links,
+    /// The host's clock.
+    pub clock: Clock,
+    /// The operator's wishes.
+    pub stop: StopRequests,
+}
+
+/// Connects, lets `body` do its work, which leaves the rig off, and finalises the log that is then being written. [`attend`] is a body;
+/// so is [`once`] around anything else.
+pub async fn with_rig(frame: Frame, body: impl AsyncFnOnce(&mut Rig) -> (Option<Halt>, Vec<String>)) -> Outcome {
+    let _size_limit = outlive_size_limit();
+    let Frame { profile, model, recorder, progress, links, clock, stop } = frame;
+    let acquisition = Rc::new(RefCell::new(Acquisition::new(recorder, clock, Analysis::new(model))));
+    let dialer = Dialer::new(profile.clone(), links.again.clone());
+    let mut lines = BTreeMap::new();
+    let (halt, mut troubles) = match connect(&dialer, links).await {
         Ok(devices) => {
-            let mut rig = Rig::new(
-                setup.profile.clone(),
-                devices.servo,
-                devices.brake,
-                Rc::clone(&acquisition),
-                clock,
-                stop,
-                progress,
-            );
-            let halt = survive(sequence::execute(&mut rig, devices.counter, &setup.plan)).await.err();
-            if let Some(halt) = &halt {
-                acquisition.borrow().event(Level::Error, "halt", halt.to_string());
-            }
-            let troubles = rig.switch_off(rig.stop.hurried()).await;
-            for (device, line) in [("servo", rig.servo.statistics()), ("brake", rig.brake.statistics())] {
-                acquisition.borrow().event(Level::Info, "line", format!("{device}: {line}"));
-            }
-            rig.progress.finish();
-            // A stop that came while the rig was stopping by itself was a stop all the same.
-            let halt = halt.or_else(|| rig.heed_stop().err());
-            (halt, troubles)
+            let mut rig = Rig::new(profile, devices, dialer, Rc::clone(&acquisition), clock, stop, progress);
+            let outcome = body(&mut rig).await;
+            lines.extend(statistics(&rig));
+            leave(rig, outcome).await
         }
         Err(error) => {
             acquisition.borrow().event(Level::Error, "connect", error.to_string());
@@ -141,18 +196,49 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
     let late_failure = recorder.take_failure();
     let unwritten = recorder.unwritten();
     let mut halt = halt.or(late_failure.map(Halt::Log));
+    let mut finalised = true;
     if let Err(error) = recorder.finish() {
+        finalised = false;
         if halt.is_none() {
             halt = Some(Halt::Log(error));
         } else {
             troubles.push(format!("the log could not be finalised: {error}"));
         }
     }
-    Ok(Outcome { analysis, halt, troubles, lost, unwritten })
+    Outcome { analysis, halt, troubles, lost, unwritten, finalised, lines }
+}
+
+/// Does some work on the rig once, and switches off whatever came of it, a panic too.
+pub async fn once(rig: &mut Rig, work: impl AsyncFnOnce(&mut Rig) -> Result<(), Halt>) -> (Option<Halt>, Vec<String>) {
+    let halt = survive(work(&mut *rig)).await.err();
+    if let Some(halt) = &halt {
+        rig.acquisition.borrow().event(Level::Error, "halt", halt.to_string());
+    }
+    let troubles = rig.switch_off(halt.as_ref().map_or(Event::Finished, Halt::event)).await;
+    (halt, troubles)
+}
+
+/// What happened on the devices' lines.
+fn statistics(rig: &Rig) -> [(&'static str, BusStatistics); 2] {
+    [("servo", rig.servo.statistics()), ("brake", rig.brake.statistics())]
+}
+
+/// Leaves a rig that is off: ends the stream, and says what the lines were like.
+pub async fn leave(mut rig: Rig, outcome: (Option<Halt>, Vec<String>)) -> (Option<Halt>, Vec<String>) {
+    let (halt, mut troubles) = outcome;
+    troubles.extend(rig.end_stream().await);
+    rig.enter(Phase::Idle);
+    for (device, line) in statistics(&rig) {
+        rig.acquisition.borrow().event(Level::Info, "line", format!("{device}: {line}"));
+    }
+    rig.progress.finish();
+    // A stop that came while the rig was stopping by itself was a stop all the same.
+    let halt = halt.or_else(|| rig.heed_stop().err());
+    (halt, troubles)
 }
 
 /// Makes a panic of the sequence a reason to switch off in order, as any other.
-async fn survive(sequence: impl Future<Output = Result<(), Halt>>) -> Result<(), Halt> {
+pub async fn survive(sequence: impl Future<Output = Result<(), Halt>>) -> Result<(), Halt> {
     let mut sequence = std::pin::pin!(sequence);
     std::future::poll_fn(|context| {
         // The rig is only switched off afterwards, from whatever state it is in.
@@ -171,57 +257,68 @@ fn outlive_size_limit() -> Option<Signal> {
     signal(SignalKind::from_raw(SIGXFSZ)).inspect_err(|error| tracing::warn!("SIGXFSZ is not handled: {error}")).ok()
 }
 
-/// Metadata and attachments that say what this log is.
-fn describe(recorder: &Recorder, setup: &Setup, clock: Clock) {
-    let plan = &setup.plan;
-    let now = clock.now_ns();
-    let directions: Vec<_> = plan.directions.iter().map(ToString::to_string).collect();
-    recorder.write(
-        now,
-        now,
-        Entry::Run(Box::new(RunMetadata {
+/// What every log of a session says of itself.
+#[derive(Debug, Clone, Default)]
+pub struct LogHead {
+    /// Who runs it.
+    pub operator: String,
+    /// What it is for.
+    pub note: String,
+    /// The gear pair as it was given.
+    pub pair_toml: String,
+    /// The plan as it was given, of a campaign.
+    pub plan_toml: Option<String>,
+}
+
+impl LogHead {
+    /// Writes metadata and attachments; `conditions` has direction, loads, speeds and revolutions.
+    pub fn describe(&self, recorder: &Recorder, profile: &Profile, conditions: RunMetadata, clock: Clock) {
+        let now = clock.now_ns();
+        let run = RunMetadata {
             run_id: uuid::Uuid::new_v4().to_string(),
             started: jiff::Timestamp::now().to_string(),
             software: SOFTWARE.into(),
             host: nix::unistd::gethostname().ok().and_then(|name| name.into_string().ok()).unwrap_or_default(),
-            backend: setup.profile.name.clone(),
-            operator: setup.operator.clone(),
-            note: setup.note.clone(),
-            direction: directions.join(","),
-            load_nm: plan.loads_nm.clone(),
-            speed_rpm: vec![plan.speed_rpm],
-            revolutions: Some(plan.revolutions),
-        })),
-    );
-    let attach = |name, text: &str| {
-        recorder.write(now, now, Entry::Attachment(name, "application/toml", text.as_bytes().to_vec()));
-    };
-    attach("pair.toml", &setup.pair_toml);
-    attach("rig.toml", &setup.profile.to_toml());
-}
-
-async fn connect(profile: &Profile, links: Links) -> Result<Devices, Halt> {
-    let (servo, brake, counter) = (&profile.servo, &profile.brake, &profile.counter);
-    let address =
-        |device, port: &str, baud, format: &str| Address { device, port: port.into(), baud, format: format.into() };
-    let at_servo = address("servo", &servo.port, servo.baud, &servo.format);
-    let at_brake = address("brake", &brake.port, brake.baud, &brake.format);
-    let at_counter = address("counter", &counter.port, counter.baud, &counter.format);
-    let open_servo = device::find(device::SERVOS, "servo", &servo.driver)?;
-    let open_brake = device::find(device::BRAKES, "brake", &brake.driver)?;
-    let open_counter = device::find(device::COUNTERS, "counter", &counter.driver)?;
-    Ok(Devices {
-        servo: open_servo(open(links.servo, &at_servo).await?, at_servo, servo),
-        brake: open_brake(open(links.brake, &at_brake).await?, at_brake, brake),
-        counter: open_counter(open(links.counter, &at_counter).await?, at_counter, counter),
-    })
-}
-
-async fn open(link: Option<Link>, address: &Address) -> Result<Link, LinkError> {
-    match link {
-        Some(link) => Ok(link),
-        None => address.open().await,
+            backend: profile.name.clone(),
+            operator: self.operator.clone(),
+            note: self.note.clone(),
+            ..conditions
+        };
+        recorder.write(now, now, Entry::Run(Box::new(run)));
+        let attach = |name, text: &str| {
+            recorder.write(now, now, Entry::Attachment(name, "application/toml", text.as_bytes().to_vec()));
+        };
+        attach("pair.toml", &self.pair_toml);
+        attach("rig.toml", &profile.to_toml());
+        if let Some(calibration) = &profile.calibration_toml {
+            attach(crate::calibration::ATTACHMENT, calibration);
+        }
+        if let Some(plan) = &self.plan_toml {
+            attach("plan.toml", plan);
+        }
     }
+}
+
+/// How a session writes its logs.
+#[must_use]
+pub fn writer_options(profile: &Profile) -> WriterOptions {
+    WriterOptions {
+        chunk_period_ms: profile.log.chunk_ms,
+        sync_period_ms: profile.log.sync_ms,
+        ..WriterOptions::new(SOFTWARE)
+    }
+}
+
+/// Opens the three devices.
+///
+/// # Errors
+/// [`Halt::Link`], [`Halt::Driver`].
+pub async fn connect(dialer: &Dialer, links: Links) -> Result<Devices, Halt> {
+    Ok(Devices {
+        servo: dialer.servo(links.servo).await?,
+        brake: dialer.brake(links.brake).await?,
+        counter: dialer.counter(links.counter).await?,
+    })
 }
 
 /// Checks that every driver of the profile exists, before anything is opened or written.

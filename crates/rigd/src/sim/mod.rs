@@ -4,15 +4,19 @@
 //! languages; [`world`] holds both on one clock; [`serve`] carries their bytes over pipes in this process or, with [`pty`], over
 //! terminals that any master can open. Drivers and codecs are the same either way.
 
+pub mod commands;
 pub mod emulator;
 pub mod plant;
+pub mod proxy;
 pub mod pty;
 pub mod serve;
+pub mod shaft_record;
 pub mod starter;
+pub mod trial;
 pub mod world;
 
 use std::cell::RefCell;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -23,9 +27,12 @@ use thiserror::Error;
 pub use plant::PlantSpec;
 use plant::undocumented::{OUTSIDE, UNDOCUMENTED, find};
 use pty::Terminal;
+use shaft_record::ShaftRecord;
 use starter::Starter;
 use world::World;
 
+use crate::device::Part;
+use crate::link::Link;
 use crate::profile::Profile;
 use crate::run::session::Links;
 use crate::run::stop::StopRequests;
@@ -118,19 +125,55 @@ pub fn spec(model: &NominalModel, undocumented: &[String]) -> Result<PlantSpec, 
     Ok(spec)
 }
 
+/// Turns the encoders' discs on their shafts as the profile says they are.
+pub fn mount_discs(spec: &mut PlantSpec, profile: &Profile) {
+    spec.encoders.input.clocking_rad += profile.counter.input_mounted_deg.to_radians();
+    spec.encoders.output.clocking_rad += profile.counter.output_mounted_deg.to_radians();
+}
+
 /// Starts the rig within this process, on the runtime's clock; needs a local task set.
 ///
 /// # Errors
 /// [`SimError`] when the plant cannot be built.
 pub fn start_in_process(spec: &PlantSpec, rate_hz: f64, seed: u64) -> Result<Links, SimError> {
-    let world = Rc::new(RefCell::new(World::new(spec, rate_hz, seed)?));
-    let pipe = || tokio::io::duplex(PIPE_BYTES);
-    let ((servo, servo_device), (brake, brake_device), (counter, counter_device)) = (pipe(), pipe(), pipe());
-    let profile = Profile::simulated();
-    tokio::task::spawn_local(serve::modbus(servo_device, Rc::clone(&world), serve::Slave::servo(&profile)));
-    tokio::task::spawn_local(serve::modbus(brake_device, Rc::clone(&world), serve::Slave::brake(&profile)));
-    tokio::task::spawn_local(serve::counter(counter_device, world));
-    Ok(Links { servo: Some(Box::new(servo)), brake: Some(Box::new(brake)), counter: Some(Box::new(counter)) })
+    Ok(links_to(&Rc::new(RefCell::new(World::new(spec, rate_hz, seed)?))))
+}
+
+/// Links to a world within this process; a device that the world says is unplugged hangs up and cannot be dialled.
+#[must_use]
+pub fn links_to(world: &Rc<RefCell<World>>) -> Links {
+    let shared = Rc::clone(world);
+    let dial = move |part: Part| -> Option<Link> {
+        let (ours, device) = tokio::io::duplex(PIPE_BYTES);
+        let (world, profile) = (Rc::clone(&shared), Profile::simulated());
+        let mut unplugged = world.borrow().plug(part)?;
+        tokio::task::spawn_local(async move {
+            let served = async {
+                match part {
+                    Part::Servo => serve::modbus(device, world, serve::Slave::servo(&profile)).await,
+                    Part::Brake => serve::modbus(device, world, serve::Slave::brake(&profile)).await,
+                    Part::Counter => serve::counter(device, world).await,
+                }
+            };
+            tokio::select! {
+                () = served => {}
+                _ = unplugged.changed() => {}
+            }
+        });
+        Some(Box::new(ours))
+    };
+    let links = [Part::Servo, Part::Brake, Part::Counter].map(&dial);
+    let [servo, brake, counter] = links;
+    Links { servo, brake, counter, again: Some(Rc::new(dial)) }
+}
+
+/// What `rigd sim` does beside serving its ports.
+#[derive(Debug, Clone, Default)]
+pub struct Extras {
+    /// A table of the true shaft speeds.
+    pub record: Option<PathBuf>,
+    /// Takes commands from standard input.
+    pub commands: bool,
 }
 
 /// Serves the rig on pseudo-terminals in `directory` until a stop is asked for, or the run that started it dies; prints a line a
@@ -143,6 +186,7 @@ pub async fn serve_ptys(
     seed: u64,
     directory: &Path,
     profile: &Profile,
+    extras: &Extras,
     stop: StopRequests,
 ) -> Result<(), SimError> {
     use std::io::Write as _;
@@ -150,6 +194,13 @@ pub async fn serve_ptys(
     let io = |what: String| move |source| SimError::Io { what, source };
     let directory = directory.canonicalize().map_err(io(format!("directory {}", directory.display())))?;
     let world = Rc::new(RefCell::new(World::new(spec, world::IDLE_RATE_HZ, seed)?));
+    if let Some(path) = &extras.record {
+        let record = ShaftRecord::create(path).map_err(io(format!("--record {}", path.display())))?;
+        world.borrow_mut().keep_record(record);
+    }
+    if extras.commands {
+        commands::listen(&world);
+    }
     let port = |name: &str| {
         let path = directory.join(name);
         Terminal::at(&path).map_err(io(format!("port {}", path.display())))

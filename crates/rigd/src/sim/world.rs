@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use tokio::sync::watch;
 use tokio::time::Instant;
 use wire::modbus::Request;
 use wire::rd60xx::Model;
@@ -9,10 +10,15 @@ use wire::rd60xx::Model;
 use super::emulator::{
     BrakeCoil, BrakeEmulator, CounterEmulator, EncoderPair, Latched, Reply, ServoAxis, ServoEmulator,
 };
-use super::plant::{Plant, PlantError, PlantSpec};
+use super::plant::{Plant, PlantError, PlantSpec, Truth};
+use super::shaft_record::ShaftRecord;
+use crate::device::Part;
 
 /// Sampling of the plant while the counter box does not ask for any, Hz.
 pub const IDLE_RATE_HZ: f64 = 10_000.0;
+
+/// Input terminal of the emergency stop, as the drive is commissioned.
+const EMERGENCY_STOP_INPUT: u8 = 8;
 
 /// How often the counter box looks whether a frame is full.
 const FRAME_PERIOD: Duration = Duration::from_millis(10);
@@ -30,6 +36,24 @@ pub struct World {
     period_ns: u64,
     time_ns: u64,
     stream: Vec<u8>,
+    plugs: [Plug; 3],
+    record: Option<ShaftRecord>,
+    /// Plant counts at which the counter box began to count, and the indices that had passed before.
+    counts_from: [i64; 2],
+    passed_before: [Option<i64>; 2],
+    plant_counts: [i64; 2],
+}
+
+/// A device's plug: pulled, and told to whoever serves its line.
+struct Plug {
+    out: bool,
+    told: watch::Sender<()>,
+}
+
+impl Default for Plug {
+    fn default() -> Self {
+        Self { out: false, told: watch::channel(()).0 }
+    }
 }
 
 impl World {
@@ -49,7 +73,64 @@ impl World {
             period_ns: (1e9 / rate_hz).round() as u64,
             time_ns: 0,
             stream: Vec::new(),
+            plugs: Default::default(),
+            record: None,
+            counts_from: [0; 2],
+            passed_before: [None; 2],
+            plant_counts: [0; 2],
         })
+    }
+
+    /// Keeps a record of the true shaft speeds from now on.
+    pub fn keep_record(&mut self, record: ShaftRecord) {
+        self.record = Some(record);
+    }
+
+    /// Pulls a device's plug: its line hangs up and cannot be dialled, while the device itself goes on.
+    pub fn unplug(&mut self, part: Part) {
+        self.plugs[part as usize].out = true;
+        self.plugs[part as usize].told.send_replace(());
+    }
+
+    /// Puts a device's plug in again.
+    pub fn replug(&mut self, part: Part) {
+        self.plugs[part as usize].out = false;
+    }
+
+    /// Notice of the next time that a device's plug is pulled; `None` while it is out.
+    #[must_use]
+    pub fn plug(&self, part: Part) -> Option<watch::Receiver<()>> {
+        let plug = &self.plugs[part as usize];
+        (!plug.out).then(|| plug.told.subscribe())
+    }
+
+    /// Presses or releases the emergency stop: a normally closed contact at the drive's input DI8.
+    pub fn press_emergency_stop(&mut self, pressed: bool) {
+        self.advance();
+        self.servo.set_terminal(EMERGENCY_STOP_INPUT, !pressed, &mut self.plant);
+    }
+
+    /// Makes the drive one that has no watchdog: its register takes no value.
+    pub fn take_watchdog_away(&mut self) {
+        self.servo.forget_watchdog();
+    }
+
+    /// Sets what the brake's sensor shows beside its own temperature, °C.
+    pub fn heat_brake_by(&mut self, by_c: f64) {
+        self.brake.heat_by(by_c);
+    }
+
+    /// Makes the counter box begin anew, as after a cut of its power: stopped, counting from elsewhere.
+    pub fn restart_counter(&mut self) {
+        self.counter = CounterEmulator::new("SIM-0001", &self.plant);
+        self.counts_from = [self.plant_counts[0] - 12_345, self.plant_counts[1] + 67_890];
+        self.passed_before = [self.plant.input_index_counts(), self.plant.output_index_counts()];
+    }
+
+    /// The truth of the plant, now.
+    pub fn truth(&mut self) -> Truth {
+        self.advance();
+        self.plant.truth()
     }
 
     /// Brings the plant up to now, and hands its samples to the counter box.
@@ -61,13 +142,22 @@ impl World {
         while self.time_ns + self.period_ns <= now_ns {
             let sample = self.plant.step();
             self.time_ns += self.period_ns;
+            self.plant_counts = [sample.input_counts, sample.output_counts];
+            // A box that lost its power counts from elsewhere and knows no index that passed before.
+            let [input_from, output_from] = self.counts_from;
+            let seen = |index: Option<i64>, before: Option<i64>, from: i64| {
+                index.filter(|_| index != before).map(|counts| counts - from)
+            };
             let latched = Latched {
-                input: sample.input_counts,
-                output: sample.output_counts,
-                input_index: self.plant.input_index_counts(),
-                output_index: self.plant.output_index_counts(),
+                input: sample.input_counts - input_from,
+                output: sample.output_counts - output_from,
+                input_index: seen(self.plant.input_index_counts(), self.passed_before[0], input_from),
+                output_index: seen(self.plant.output_index_counts(), self.passed_before[1], output_from),
             };
             self.counter.sample(self.time_ns, &latched, &mut self.stream);
+            if let Some(record) = &mut self.record {
+                record.take(self.time_ns, &self.plant);
+            }
         }
         self.servo.tick(now_ns, &mut self.plant);
         self.brake.tick(now_ns, &mut self.plant);

@@ -2,13 +2,14 @@
 //! devices as another master sees them.
 #![allow(dead_code, reason = "each test takes its part")]
 
+pub mod bench;
 pub mod line;
 
 use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -55,6 +56,10 @@ impl Process {
         kill(self.pid(), signal).expect("it is there");
     }
 
+    pub fn ended(&mut self) -> bool {
+        self.0.try_wait().expect("a child").is_some()
+    }
+
     pub fn wait(&mut self, seconds: f64) -> ExitStatus {
         wait_for("the end of the process", seconds, || self.0.try_wait().expect("a child"))
     }
@@ -82,6 +87,22 @@ pub fn children(parent: Pid) -> Vec<Pid> {
     list.split_whitespace().filter_map(|pid| pid.parse().ok()).map(Pid::from_raw).collect()
 }
 
+/// A line of the plant's own record.
+#[derive(Debug, Clone, Copy)]
+pub struct Shaft {
+    pub unix_s: f64,
+    pub input_rpm: f64,
+    pub output_rpm: f64,
+    pub servo_on: bool,
+    pub brake_a: f64,
+}
+
+impl Shaft {
+    pub fn turns(&self) -> bool {
+        self.input_rpm.abs().max(self.output_rpm.abs()) > 0.1
+    }
+}
+
 /// `rigd sim` as a process of its own.
 pub struct Sim {
     pub process: Process,
@@ -97,6 +118,7 @@ impl Sim {
         let ports = directory.path().join("ports");
         let mut command = rigd(directory.path());
         command.arg("sim").arg("--pty-dir").arg(&ports).arg("--seed").arg(seed.to_string()).stdout(Stdio::piped());
+        command.arg("--commands").arg("--record").arg(directory.path().join("shafts.csv")).stdin(Stdio::piped());
         let mut process = Process::spawn(&mut command);
         let output = process.0.stdout.take().expect("its output");
         let mut lines = Vec::new();
@@ -108,6 +130,36 @@ impl Sim {
         }
         assert_eq!(lines.last().map(String::as_str), Some("ready"));
         Self { process, lines, ready_s: begun.elapsed().as_secs_f64(), directory }
+    }
+
+    /// A command to the hands on the rig.
+    pub fn tell(&mut self, command: &str) {
+        use std::io::Write as _;
+        writeln!(self.process.0.stdin.as_mut().expect("its input"), "{command}").expect("it listens");
+    }
+
+    /// The plant's own record of its shafts, whole lines.
+    pub fn shafts(&self) -> Vec<Shaft> {
+        let text = std::fs::read_to_string(self.directory.path().join("shafts.csv")).expect("a record");
+        let line = |line: &str| {
+            let values: Vec<f64> = line.split(',').filter_map(|value| value.parse().ok()).collect();
+            let [unix_s, input_rpm, output_rpm, servo_on, brake_a, _] = values[..] else { return None };
+            Some(Shaft { unix_s, input_rpm, output_rpm, servo_on: servo_on != 0.0, brake_a })
+        };
+        text[..text.rfind('\n').unwrap_or(0)].lines().skip(1).filter_map(line).collect()
+    }
+
+    /// How long after `since` the shafts still turned, s, once they have stood for a second; they did turn at `since`.
+    pub fn standstill_after(&self, since: SystemTime, patience_s: f64) -> f64 {
+        let since = since.duration_since(UNIX_EPOCH).expect("after 1970").as_secs_f64();
+        wait_for("standstill in the plant's record", patience_s, || {
+            let shafts = self.shafts();
+            let end = shafts.last()?.unix_s;
+            let before = shafts.iter().rfind(|shaft| shaft.unix_s <= since)?;
+            assert!(before.turns(), "the shaft turned, so that there was something to stop: {before:?}");
+            let last = shafts.iter().rfind(|shaft| shaft.turns())?.unix_s;
+            (end - last > 1.0 && end > since).then_some((last - since).max(0.0))
+        })
     }
 
     pub fn port(&self, name: &str) -> PathBuf {

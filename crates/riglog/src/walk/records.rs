@@ -63,6 +63,11 @@ impl<R: Read + Seek> Records<R> {
         self.go_to(at, options(self.file_bytes).with_skip_start_magic(true))
     }
 
+    /// The file has grown.
+    pub(crate) fn grow(&mut self, file_bytes: u64) {
+        self.file_bytes = self.file_bytes.max(file_bytes);
+    }
+
     fn go_to(&mut self, at: u64, options: LinearReaderOptions) -> io::Result<()> {
         self.source.seek(SeekFrom::Start(at))?;
         (self.fed_to, self.at) = (at, at);

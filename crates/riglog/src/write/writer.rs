@@ -23,6 +23,7 @@ use super::{
 use crate::{
     error::LogError,
     metadata::{EncoderMetadata, MetadataMap, RunMetadata, SEALED, SEALED_KEY},
+    parts::PartMetadata,
     proto::{AngleBatch, Backlash, Level, RigState, Timestamp, TransmissionError, foxglove},
     topic::{ENCODING, Topic},
 };
@@ -43,9 +44,12 @@ pub struct LogWriter {
     chunk: Chunk,
     /// The message under way, encoded.
     encoded: Vec<u8>,
-    sequences: [u32; Topic::ALL.len()],
+    sequences: Sequences,
     samples: u64,
 }
+
+/// The number of the next message of each channel.
+pub(super) type Sequences = [u32; Topic::ALL.len()];
 
 /// The chunk under way.
 struct Chunk {
@@ -84,6 +88,8 @@ impl LogWriter {
     /// The file exists, or the operating system refuses.
     pub fn create(path: impl AsRef<Path>, options: WriterOptions) -> Result<Self, LogError> {
         let path = path.as_ref();
+        // Made before the file is: a process that is killed in between shall not leave an empty one.
+        let encoder = encoder(path, &options)?;
         let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|source| {
             if source.kind() == io::ErrorKind::AlreadyExists {
                 LogError::Exists { path: path.to_owned() }
@@ -94,11 +100,13 @@ impl LogWriter {
         // The file is ours by its creation; a recovery that looks into the directory right now lets go at once.
         file.lock().map_err(LogError::io("lock", path))?;
         let for_sync = file.try_clone().map_err(LogError::io("open", path))?;
-        sync_directory_of(path);
-        Self::on(path, Box::new(file), move || for_sync.sync_data(), options).inspect_err(|_| {
+        let log = Self::on(path, Box::new(file), move || for_sync.sync_data(), options, encoder).inspect_err(|_| {
             // Nothing was written; an empty file would only puzzle the next start.
             let _ = std::fs::remove_file(path);
-        })
+        })?;
+        // After the header, for a kill during the sync must not leave an empty file.
+        sync_directory_of(path);
+        Ok(log)
     }
 
     fn on(
@@ -106,9 +114,8 @@ impl LogWriter {
         store: Box<dyn Store>,
         sync: impl FnMut() -> io::Result<()> + Send + 'static,
         options: WriterOptions,
+        mut encoder: Encoder,
     ) -> Result<Self, LogError> {
-        let mut encoder = Encoder::new(&options.library, options.compression_level, channels())
-            .map_err(|error| LogError::Compress { path: path.to_owned(), bytes: 0, source: io_error(error) })?;
         let sync_period = Duration::from_millis(options.sync_period_ms.into());
         let mut output = Output::new(path, store, sync, sync_period)?;
         output.hand_over(encoder.take(), 0)?;
@@ -302,7 +309,37 @@ impl LogWriter {
         self.output.sync_if_due()
     }
 
-    fn metadata(&mut self, name: &'static str, map: &MetadataMap) -> Result<(), LogError> {
+    /// Adds a metadata record of another name, as `rig.mounting`.
+    ///
+    /// # Errors
+    /// As [`LogWriter::run_metadata`].
+    pub fn named_metadata(&mut self, name: &'static str, map: &MetadataMap) -> Result<(), LogError> {
+        self.metadata(name, map)
+    }
+
+    /// Says which part of a log that is split this is.
+    pub(super) fn part(&mut self, part: &PartMetadata) -> Result<(), LogError> {
+        self.metadata(PartMetadata::NAME, &part.to_map())
+    }
+
+    /// The number of the next message of each channel.
+    pub(super) fn sequences(&self) -> Sequences {
+        self.sequences
+    }
+
+    /// Numbers messages on from where another part ended.
+    pub(super) fn go_on_from(&mut self, sequences: Sequences) {
+        self.sequences = sequences;
+    }
+
+    /// Writes the last state of the part before under its number there.
+    pub(super) fn repeat_state(&mut self, log_ns: u64, publish_ns: u64, state: &RigState) -> Result<(), LogError> {
+        let number = &mut self.sequences[Topic::State as usize];
+        *number = number.wrapping_sub(1);
+        self.state(log_ns, publish_ns, state)
+    }
+
+    pub(super) fn metadata(&mut self, name: &str, map: &MetadataMap) -> Result<(), LogError> {
         self.check_size("a metadata record", map.iter().map(|(key, value)| key.len() + value.len()).sum())?;
         let metadata = Metadata { name: name.to_owned(), metadata: map.clone() };
         self.lone_record(|encoder| encoder.metadata(&metadata))
@@ -335,6 +372,15 @@ impl LogWriter {
     fn compress_error(&self, error: mcap::McapError) -> LogError {
         LogError::Compress { path: self.path().to_owned(), bytes: self.chunk.bytes, source: io_error(error) }
     }
+}
+
+/// The encoder of a log at `path`, with its head.
+fn encoder(path: &Path, options: &WriterOptions) -> Result<Encoder, LogError> {
+    Encoder::new(&options.library, options.compression_level, channels()).map_err(|error| LogError::Compress {
+        path: path.to_owned(),
+        bytes: 0,
+        source: io_error(error),
+    })
 }
 
 /// The channels of a rig log, each with a schema of its own number.
@@ -382,7 +428,8 @@ mod tests {
 
     fn writer(disk: &FullDisk, period_ms: u32) -> LogWriter {
         let options = WriterOptions { chunk_period_ms: period_ms, ..WriterOptions::new("test") };
-        LogWriter::on(Path::new("x.mcap"), Box::new(disk.clone()), || Ok(()), options).unwrap()
+        let encoder = encoder(Path::new("x.mcap"), &options).unwrap();
+        LogWriter::on(Path::new("x.mcap"), Box::new(disk.clone()), || Ok(()), options, encoder).unwrap()
     }
 
     fn texts(bytes: &[u8]) -> (Vec<String>, Completeness) {
@@ -466,6 +513,38 @@ mod tests {
                 assert!(matches!(completeness, Completeness::Truncated { .. }));
             }
         }
+    }
+
+    #[test]
+    fn what_was_handed_over_is_synced_within_the_period_and_at_the_end() {
+        use std::sync::Mutex;
+        let disk = FullDisk::with_room(1 << 20);
+        // (when, bytes on the disk by then) of every sync.
+        let synced = Arc::new(Mutex::new(Vec::new()));
+        let (content, log_of_syncs) = (disk.content.clone(), synced.clone());
+        let sync = move || {
+            let bytes = content.lock().unwrap().len();
+            log_of_syncs.lock().unwrap().push((Instant::now(), bytes));
+            Ok(())
+        };
+        let options = WriterOptions { chunk_period_ms: 5, sync_period_ms: 50, ..WriterOptions::new("test") };
+        let encoder = encoder(Path::new("x.mcap"), &options).unwrap();
+        let mut log = LogWriter::on(Path::new("x.mcap"), Box::new(disk.clone()), sync, options, encoder).unwrap();
+        let began = Instant::now();
+        let mut n = 0;
+        while began.elapsed() < Duration::from_millis(500) {
+            say(&mut log, n * 10, "message").unwrap();
+            log.tick().unwrap();
+            n += 1;
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        let syncs = synced.lock().unwrap().clone();
+        // Every 50 ms, at most doubled by a machine that is busy, and each takes what was there.
+        let longest = syncs.windows(2).map(|pair| pair[1].0 - pair[0].0).max().unwrap();
+        assert!(syncs.len() >= 4 && longest < Duration::from_millis(250), "{} syncs, {longest:?} apart", syncs.len());
+        assert!(syncs.windows(2).all(|pair| pair[1].1 > pair[0].1));
+        log.finish().unwrap();
+        assert_eq!(synced.lock().unwrap().last().unwrap().1, disk.bytes().len(), "the end is on the disk too");
     }
 
     #[test]

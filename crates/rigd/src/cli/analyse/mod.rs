@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use gearmodel::NominalModel;
 use gearmodel::measure::{AngleGrid, MeasureError, OrderAxis, RunConditions, RunTe};
-use riglog::{LogError, RunSpan, RunStream, RunTotals, RunVisitor, SampleBlock};
+use riglog::{LogError, LogParts, RunSpan, RunStream, RunTotals, RunVisitor, SampleBlock};
 use thiserror::Error;
 
 use super::model::output::{Output, OutputError};
@@ -126,8 +126,9 @@ fn run(args: &Args) -> Result<Exit, AnalyseError> {
     let (model, _) = model_for(&args.logs[0], args.pair.as_deref())?;
     let mut collector = Collector { model: &model, grid, runs: Vec::new() };
     let mut incomplete = Vec::new();
-    for path in &args.logs {
-        let totals = RunStream::open(path)?.stream(&mut collector)?;
+    for log in LogParts::group(&args.logs)? {
+        let path = log.first().to_owned();
+        let totals = RunStream::open_parts(log)?.stream(&mut collector)?;
         if totals.losses_in_file > 0 {
             incomplete.push(format!("{}: {} samples are missing", path.display(), totals.losses_in_file));
         }

@@ -34,13 +34,15 @@ pub struct BrakeEmulator {
     registers: [u16; REGISTERS],
     protection: Protection,
     writes: u64,
+    heated_by_c: f64,
 }
 
 impl BrakeEmulator {
     /// A device of this model at this unit number, switched off.
     pub fn new(unit: u8, model: Model) -> Self {
         let map = Map::new(model);
-        let mut device = Self { unit, map, registers: [0; REGISTERS], protection: Protection::None, writes: 0 };
+        let mut device =
+            Self { unit, map, registers: [0; REGISTERS], protection: Protection::None, writes: 0, heated_by_c: 0.0 };
         device.registers[usize::from(address::ID)] = model.id();
         device.registers[usize::from(address::SERIAL)] = (SERIAL >> 16) as u16;
         device.registers[usize::from(address::SERIAL) + 1] = SERIAL as u16;
@@ -71,6 +73,11 @@ impl BrakeEmulator {
     /// Whether the output is on.
     pub fn is_enabled(&self) -> bool {
         self.registers[usize::from(address::ENABLE)] != 0
+    }
+
+    /// Makes its sensor show so much more than the coil has, °C.
+    pub fn heat_by(&mut self, by_c: f64) {
+        self.heated_by_c = by_c;
     }
 
     /// Answers a request. The time does not matter to this device, which has no watchdog of its own.
@@ -125,7 +132,7 @@ impl BrakeEmulator {
         let power_w = voltage_v * current_a;
         let limited = self.is_enabled() && current_a >= self.value(&map.current_set) - 0.5 * map.current_set.scale;
         let measured = [
-            (&map.temperature, coil.temperature_c()),
+            (&map.temperature, coil.temperature_c() + self.heated_by_c),
             (&map.internal_temperature, ROOM_C + RISE_C_PER_W * power_w),
             (&map.voltage_out, voltage_v),
             (&map.current_out, current_a),

@@ -51,6 +51,7 @@ pub struct ServoEmulator {
     last_tick_ns: Option<u64>,
     average_load_percent: f64,
     eeprom_writes: u64,
+    has_watchdog: bool,
 }
 
 impl ServoEmulator {
@@ -72,6 +73,7 @@ impl ServoEmulator {
             last_tick_ns: None,
             average_load_percent: 0.0,
             eeprom_writes: 0,
+            has_watchdog: true,
         };
         // Normally closed contacts are closed while all is well.
         for (n, def) in drive::INPUT_FUNCTIONS.iter().enumerate() {
@@ -115,6 +117,11 @@ impl ServoEmulator {
             self.terminals = if on { self.terminals | mask } else { self.terminals & !mask };
             self.act(axis);
         }
+    }
+
+    /// Makes it a drive whose watchdog's register takes no value.
+    pub fn forget_watchdog(&mut self) {
+        self.has_watchdog = false;
     }
 
     /// Raises an alarm of the drive's own, say 0006 overload: the motor is released.
@@ -275,7 +282,9 @@ impl ServoEmulator {
         let changes = self.parameters.changes(start, values)?;
         let ram_only = self.word(drive::AUXILIARY.address) == drive::AUX_RAM_ONLY;
         for (address, raw) in changes {
-            if address == drive::ALARM.address {
+            if address == drive::WATCHDOG.address && !self.has_watchdog {
+                continue;
+            } else if address == drive::ALARM.address {
                 self.reset_alarm();
             } else if address == drive::INPUTS.address {
                 self.software_inputs = raw as u16;

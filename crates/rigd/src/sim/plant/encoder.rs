@@ -79,7 +79,7 @@ impl EncoderSpec {
             phase,
             "give a finite angle",
         )?;
-        in_range("encoders.clocking_rad", self.clocking_rad, "rad", (-1.0, 1.0), "a mounting error")?;
+        in_range("encoders.clocking_rad", self.clocking_rad, "rad", (-7.0, 7.0), "a mounting, a turn at most")?;
         in_range("encoders.noise_rad", self.noise_rad, "rad", (0.0, 0.01), "RMS of one reading")
     }
 }

@@ -1,0 +1,431 @@
+//! The plan of a campaign as TOML. What `rigd diagnose --plan-next` writes is one: `[[runs]]` alone suffices.
+
+use std::path::Path;
+
+use gearmodel::Direction;
+use serde::{Deserialize, Serialize};
+
+use super::CampaignError;
+use crate::profile::Profile;
+use crate::run::attend::Suspend;
+use crate::run::job::{Kind, RunSpec, Settle};
+use crate::run::limits::slip_power_w;
+
+/// Most runs of a plan, repeats included.
+const MOST_RUNS: usize = 10_000;
+/// Most revolutions of a run.
+const MOST_REVOLUTIONS: u32 = 100_000;
+
+/// A campaign's plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CampaignPlan {
+    /// What it is called.
+    pub name: String,
+    /// Who runs it, for the logs.
+    pub operator: String,
+    /// What it is for, for the logs.
+    pub note: String,
+    /// Sampling, Hz.
+    pub rate_hz: f64,
+    /// How often all runs are done.
+    pub repeats: u32,
+    /// The order of the runs.
+    pub order: Order,
+    /// Seed of a random order.
+    pub seed: u64,
+    /// A lost device is waited for this long, s.
+    pub reconnect_s: f64,
+    /// Turns under load before the first run.
+    pub warm_up: Option<WarmUp>,
+    /// Settling by what is measured.
+    pub settle: Option<SettlePlan>,
+    /// The same runs first and last.
+    pub reference: Option<Reference>,
+    /// What suspends the campaign instead of ending it.
+    pub suspend: Option<SuspendPlan>,
+    /// Every direction × load × speed.
+    pub matrix: Vec<Matrix>,
+    /// Single runs.
+    pub runs: Vec<Single>,
+}
+
+impl Default for CampaignPlan {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            operator: String::new(),
+            note: String::new(),
+            rate_hz: 10_000.0,
+            repeats: 1,
+            order: Order::AsWritten,
+            seed: 1,
+            reconnect_s: 300.0,
+            warm_up: None,
+            settle: None,
+            reference: None,
+            suspend: None,
+            matrix: Vec::new(),
+            runs: Vec::new(),
+        }
+    }
+}
+
+/// The order of the runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Order {
+    /// As the plan has them.
+    AsWritten,
+    /// Shuffled, so that what drifts with time is no effect of load or speed.
+    Random,
+}
+
+/// A sense, or both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Senses {
+    /// Counter-clockwise.
+    Ccw,
+    /// Clockwise.
+    Cw,
+    /// First ccw, then cw.
+    Both,
+}
+
+impl Senses {
+    fn list(self) -> Vec<Direction> {
+        match self {
+            Self::Ccw => vec![Direction::Ccw],
+            Self::Cw => vec![Direction::Cw],
+            Self::Both => vec![Direction::Ccw, Direction::Cw],
+        }
+    }
+}
+
+/// Turns under load before the first run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WarmUp {
+    /// Sense.
+    pub direction: Senses,
+    /// Load at the driven gear, N·m.
+    pub load_nm: f64,
+    /// Speed of the driver, rpm.
+    pub speed_rpm: f64,
+    /// How long in each sense, min.
+    pub minutes: f64,
+}
+
+/// Settling by what is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SettlePlan {
+    /// Largest change of TE over a revolution, µrad.
+    pub te_change_urad: f64,
+    /// After so many turns the run is recorded all the same.
+    pub turns_max: f64,
+}
+
+/// The same runs first and last.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// Sense.
+    pub direction: Senses,
+    /// Load at the driven gear, N·m.
+    pub load_nm: f64,
+    /// Speed of the driver, rpm.
+    pub speed_rpm: f64,
+    /// Revolutions.
+    pub revolutions: u32,
+}
+
+/// What suspends the campaign.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SuspendPlan {
+    /// A brake at its limit has to cool to this, °C.
+    pub cool_to_c: f64,
+    /// Longest wait, min.
+    pub patience_min: f64,
+    /// What it takes to go on once the emergency stop is released.
+    #[serde(default)]
+    pub after_emergency_stop: AfterEmergencyStop,
+}
+
+/// What it takes to go on once the emergency stop is released.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AfterEmergencyStop {
+    /// The operator says so: key p or SIGUSR1.
+    #[default]
+    Operator,
+    /// Nothing more. Only where nobody can be near the rig.
+    Release,
+}
+
+/// Every direction × load × speed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Matrix {
+    /// Senses.
+    pub directions: Vec<Senses>,
+    /// Loads at the driven gear, N·m.
+    pub loads_nm: Vec<f64>,
+    /// Speeds of the driver, rpm.
+    pub speeds_rpm: Vec<f64>,
+    /// Revolutions of each.
+    pub revolutions: u32,
+}
+
+/// A single run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Single {
+    /// Sense.
+    pub direction: Senses,
+    /// Load at the driven gear, N·m.
+    pub load_nm: f64,
+    /// Speed of the driver, rpm.
+    pub speed_rpm: f64,
+    /// Revolutions.
+    pub revolutions: u32,
+}
+
+impl CampaignPlan {
+    /// Reads a plan; its text goes to the logs.
+    ///
+    /// # Errors
+    /// [`CampaignError`] with file, line and key.
+    pub fn load(path: &Path) -> Result<(Self, String), CampaignError> {
+        let text = std::fs::read_to_string(path).map_err(|source| CampaignError::Read { path: path.into(), source })?;
+        let plan = Self::parse(&text, path)?;
+        Ok((plan, text))
+    }
+
+    /// Reads a plan's text; `path` is for the error.
+    ///
+    /// # Errors
+    /// [`CampaignError::Parse`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, CampaignError> {
+        toml::from_str(text).map_err(|source| CampaignError::Parse { path: path.into(), source: Box::new(source) })
+    }
+
+    /// Every run of the matrices and the single ones once, in the order of the plan.
+    #[must_use]
+    pub fn measurements(&self) -> Vec<RunSpec> {
+        let mut runs = Vec::new();
+        for matrix in &self.matrix {
+            for &speed_rpm in &matrix.speeds_rpm {
+                for &load_nm in &matrix.loads_nm {
+                    for senses in &matrix.directions {
+                        let single = Single { direction: *senses, load_nm, speed_rpm, revolutions: matrix.revolutions };
+                        runs.extend(single.runs(Kind::Measure));
+                    }
+                }
+            }
+        }
+        runs.extend(self.runs.iter().flat_map(|single| single.runs(Kind::Measure)));
+        runs
+    }
+
+    /// The reference's runs.
+    #[must_use]
+    pub fn reference_runs(&self) -> Vec<RunSpec> {
+        let single = |reference: &Reference| Single {
+            direction: reference.direction,
+            load_nm: reference.load_nm,
+            speed_rpm: reference.speed_rpm,
+            revolutions: reference.revolutions,
+        };
+        self.reference.iter().flat_map(|reference| single(reference).runs(Kind::Reference)).collect()
+    }
+
+    /// The warm-up, whole turns of at least the time that it shall last.
+    #[must_use]
+    pub fn warm_up_runs(&self) -> Vec<RunSpec> {
+        let runs = |warm_up: &WarmUp| {
+            let WarmUp { direction, load_nm, speed_rpm, minutes } = *warm_up;
+            let run = move |direction| RunSpec {
+                kind: Kind::WarmUp,
+                direction,
+                load_nm,
+                speed_rpm,
+                revolutions: (minutes * speed_rpm).ceil(),
+            };
+            direction.list().into_iter().map(run).collect::<Vec<_>>()
+        };
+        self.warm_up.iter().flat_map(runs).collect()
+    }
+
+    /// How runs settle.
+    #[must_use]
+    pub fn settle(&self) -> Option<Settle> {
+        self.settle.map(|settle| Settle { te_change_rad: settle.te_change_urad * 1e-6, turns_max: settle.turns_max })
+    }
+
+    /// What suspends it.
+    #[must_use]
+    pub fn suspend(&self) -> Option<Suspend> {
+        self.suspend.map(|suspend| Suspend {
+            cool_to_c: suspend.cool_to_c,
+            go_on_when_released: suspend.after_emergency_stop == AfterEmergencyStop::Release,
+            patience_s: suspend.patience_min * 60.0,
+        })
+    }
+
+    /// Checks every value against its range and the profile's limits; all faults at once.
+    ///
+    /// # Errors
+    /// [`CampaignError::Faults`].
+    pub fn check(&self, profile: &Profile, path: &Path) -> Result<(), CampaignError> {
+        let mut faults = Vec::new();
+        self.check_values(profile, &mut faults);
+        let measurements = self.measurements();
+        if measurements.is_empty() {
+            faults.push("there is no run in it; write [[runs]] or [[matrix]]".into());
+        }
+        if measurements.len().saturating_mul(self.repeats as usize) > MOST_RUNS {
+            faults.push(format!("{} runs × repeats = {} are more than {MOST_RUNS}", measurements.len(), self.repeats));
+        }
+        let named = |what: &'static str, runs: Vec<RunSpec>| runs.into_iter().enumerate().map(move |run| (what, run));
+        let all = named("warm_up", self.warm_up_runs())
+            .chain(named("reference", self.reference_runs()))
+            .chain(named("run", measurements));
+        for (what, (n, run)) in all {
+            let name = format!("{what} {}", n + 1);
+            check_run(&name, &run, profile, &mut faults);
+        }
+        faults.dedup();
+        if faults.is_empty() { Ok(()) } else { Err(CampaignError::Faults { path: path.into(), faults }) }
+    }
+
+    fn check_values(&self, profile: &Profile, faults: &mut Vec<String>) {
+        let mut range = |key: &str, value: f64, low: f64, high: f64, unit: &str| {
+            if !(low..=high).contains(&value) {
+                faults.push(format!("{key} = {value} must be from {low} to {high} {unit}"));
+            }
+        };
+        range("rate_hz", self.rate_hz, 10.0, 1e6, "Hz");
+        range("repeats", f64::from(self.repeats), 1.0, 1000.0, "");
+        range("reconnect_s", self.reconnect_s, 0.0, 86_400.0, "s");
+        if let Some(warm_up) = &self.warm_up {
+            range("warm_up.minutes", warm_up.minutes, 0.01, 1440.0, "min");
+        }
+        if let Some(settle) = &self.settle {
+            range("settle.te_change_urad", settle.te_change_urad, 0.01, 1e4, "µrad");
+            range("settle.turns_max", settle.turns_max, 1.25, 1000.0, "turns (five quarters are needed to compare)");
+        }
+        if let Some(suspend) = &self.suspend {
+            range("suspend.patience_min", suspend.patience_min, 0.01, 10_080.0, "min");
+            let limit = profile.limits.brake_temperature_c;
+            range("suspend.cool_to_c", suspend.cool_to_c, 0.0, limit, "°C (limits.brake_temperature_c)");
+        }
+    }
+}
+
+impl Single {
+    fn runs(self, kind: Kind) -> Vec<RunSpec> {
+        let Self { load_nm, speed_rpm, revolutions, .. } = self;
+        let run = |direction| RunSpec { kind, direction, load_nm, speed_rpm, revolutions: f64::from(revolutions) };
+        self.direction.list().into_iter().map(run).collect()
+    }
+}
+
+/// A run against the limits of the profile.
+fn check_run(name: &str, run: &RunSpec, profile: &Profile, faults: &mut Vec<String>) {
+    let (limits, rig) = (&profile.limits, &profile.name);
+    let (load, speed) = (run.load_nm, run.speed_rpm);
+    if !(speed > 0.0 && speed <= limits.speed_rpm) {
+        let limit = limits.speed_rpm;
+        faults.push(format!(
+            "{name}: speed_rpm = {speed} must be over 0 and up to {limit} rpm (limits.speed_rpm in profile '{rig}')"
+        ));
+    }
+    if !(load >= 0.0 && load <= limits.load_nm) {
+        let limit = limits.load_nm;
+        faults.push(format!(
+            "{name}: load_nm = {load} must be from 0 to {limit} N·m (limits.load_nm in profile '{rig}')"
+        ));
+    } else if profile.brake.current_a(load).is_none() {
+        faults.push(format!(
+            "{name}: load_nm = {load} N·m is beyond the brake's calibrated curve or current limit in profile '{rig}'; lower the load, or calibrate further"
+        ));
+    }
+    let power_w = slip_power_w(load, speed);
+    if power_w > limits.slip_power_w {
+        faults.push(format!(
+            "{name}: {load} N·m at {speed} rpm make {power_w:.0} W of heat in the brake, over {} W (limits.slip_power_w in profile '{rig}'); lower load or speed",
+            limits.slip_power_w
+        ));
+    }
+    if run.kind != Kind::WarmUp && !(1.0..=f64::from(MOST_REVOLUTIONS)).contains(&run.revolutions) {
+        faults.push(format!("{name}: revolutions = {} must be from 1 to {MOST_REVOLUTIONS}", run.revolutions));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NEXT: &str = "# record the other sense\n\n[[runs]]\ndirection = \"ccw\"\nload_nm = 5.0\nspeed_rpm = 5.0\nrevolutions = 4\n\n[[runs]]\ndirection = \"cw\"\nload_nm = 5.0\nspeed_rpm = 5.0\nrevolutions = 4\n";
+
+    fn faults(text: &str) -> String {
+        let path = Path::new("plan.toml");
+        CampaignPlan::parse(text, path)
+            .and_then(|plan| plan.check(&Profile::simulated(), path))
+            .expect_err("a fault")
+            .to_string()
+    }
+
+    #[test]
+    fn what_diagnose_writes_is_a_plan() {
+        let plan = CampaignPlan::parse(NEXT, Path::new("next.toml")).expect("a plan");
+        plan.check(&Profile::simulated(), Path::new("next.toml")).expect("within limits");
+        let runs = plan.measurements();
+        assert_eq!(runs.len(), 2);
+        assert_eq!((runs[1].direction, runs[1].load_nm, runs[1].revolutions), (Direction::Cw, 5.0, 4.0));
+    }
+
+    #[test]
+    fn a_matrix_is_every_direction_load_and_speed() {
+        let text =
+            "[[matrix]]\ndirections = [\"both\"]\nloads_nm = [5, 10, 15]\nspeeds_rpm = [5, 10]\nrevolutions = 2\n";
+        let plan = CampaignPlan::parse(text, Path::new("x")).expect("a plan");
+        assert_eq!(plan.measurements().len(), 12);
+    }
+
+    #[test]
+    fn all_faults_are_told_at_once_with_key_value_and_limit() {
+        let text = "repeats = 0\nrate_hz = 1\n[settle]\nte_change_urad = 5\nturns_max = 1\n[[runs]]\ndirection = \"cw\"\nload_nm = 500\nspeed_rpm = 61\nrevolutions = 0\n";
+        let said = faults(text);
+        for needle in [
+            "repeats = 0",
+            "rate_hz = 1 ",
+            "turns_max = 1",
+            "load_nm = 500",
+            "20 N·m",
+            "speed_rpm = 61",
+            "60 rpm",
+            "revolutions = 0",
+        ] {
+            assert!(said.contains(needle), "no '{needle}' in {said}");
+        }
+        assert!(faults("").contains("no run"));
+        assert!(faults("[[runs]]\ndirection=\"up\"\nload_nm=1\nspeed_rpm=1\nrevolutions=1").contains("plan.toml"));
+        assert!(faults("[[runs]]\ndirection=\"cw\"\nlaod_nm=1\nspeed_rpm=1\nrevolutions=1").contains("laod_nm"));
+        assert!(
+            faults("[[runs]]\ndirection=\"cw\"\nload_nm=nan\nspeed_rpm=1\nrevolutions=1").contains("load_nm = NaN")
+        );
+    }
+
+    #[test]
+    fn slip_power_is_tried_from_both_sides() {
+        // 120 W at 60 rpm are 19.0986 N·m.
+        let at = |load: f64| format!("[[runs]]\ndirection=\"cw\"\nload_nm={load}\nspeed_rpm=60.0\nrevolutions=1");
+        let plan = CampaignPlan::parse(&at(19.09), Path::new("x")).expect("a plan");
+        plan.check(&Profile::simulated(), Path::new("x")).expect("just within");
+        assert!(faults(&at(19.11)).contains("over 120 W"));
+    }
+}

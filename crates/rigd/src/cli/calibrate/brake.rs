@@ -1,0 +1,274 @@
+//! `rigd calibrate brake`.
+
+use std::cell::RefCell;
+use std::path::PathBuf;
+use std::rc::Rc;
+
+use gearmodel::calibration::{BrakePoint, COVERAGE, Stated, brake_curves};
+use gearmodel::{Direction, NominalModel};
+use riglog::RunMetadata;
+use serde_json::json;
+use tokio::task::LocalSet;
+
+use super::super::{Exit, fail, stop};
+use super::{Output, date};
+use crate::calibration::{BrakeCalibration, Calibration};
+use crate::clock::Clock;
+use crate::profile::Profile;
+use crate::quantity::{SPEED, TORQUE};
+use crate::run::Plan;
+use crate::run::brake_sweep::{self, SweepPlan, Swept};
+use crate::run::halt::Halt;
+use crate::run::limits::slip_power_w;
+use crate::run::progress::Progress;
+use crate::run::recorder::Recorder;
+use crate::run::rig::Rig;
+use crate::run::session::{self, Frame, Links, LogHead, Outcome};
+use crate::run::stop::StopRequests;
+use crate::{pair, sim};
+
+/// Sampling while the torque is what counts, Hz.
+const RATE_HZ: f64 = 1000.0;
+
+/// Torque over coil current, both branches
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Rated torque of the servo motor, from its name plate, as 2.39Nm
+    #[arg(long, value_name = "TORQUE", value_parser = |text: &str| TORQUE.parse(text))]
+    rated_torque: f64,
+    /// Uncertainty of the motor's torque, percent: from its maker, 5 where nothing is known
+    #[arg(long, value_name = "PERCENT", default_value_t = 5.0)]
+    torque_uncertainty: f64,
+    /// Torque of the brake without current at its shaft, from its maker or from a turn without it [default: the profile's]
+    #[arg(long, value_name = "TORQUE", value_parser = |text: &str| TORQUE.parse(text))]
+    drag: Option<f64>,
+    /// Its uncertainty
+    #[arg(long, value_name = "TORQUE", default_value = "0.1Nm", value_parser = |text: &str| TORQUE.parse(text))]
+    drag_uncertainty: f64,
+    /// Speed of the driver
+    #[arg(long, value_name = "RPM", default_value = "25", value_parser = |text: &str| SPEED.parse(text))]
+    rpm: f64,
+    /// Largest coil current, A [default: what the profile's curve says loads the gear to limits.load_nm]
+    #[arg(long, value_name = "A")]
+    max_current: Option<f64>,
+    /// Currents on the way up
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(3..=100))]
+    points: u32,
+    /// Turns of the driver that are averaged at each
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
+    turns: u32,
+    /// Ways up and down
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=20))]
+    repeats: u32,
+    /// The rig [default: the simulated rig]
+    #[arg(long, value_name = "FILE")]
+    profile: Option<PathBuf>,
+    /// Seed of the simulated rig
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Directory of the log of the calibration
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    logs: PathBuf,
+    /// Who does it, for the log
+    #[arg(long, default_value = "")]
+    operator: String,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// A rig, and where the log of its calibration goes.
+struct Setup {
+    path: PathBuf,
+    profile: Profile,
+    model: NominalModel,
+    head: LogHead,
+}
+
+/// What is refused before anything moves.
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    #[error("{option} {value} {unit} must be {expected}")]
+    Value { option: &'static str, value: f64, unit: &'static str, expected: String },
+    #[error(
+        "limits.load_nm {load_nm} N·m at --rpm {speed_rpm} makes {power_w:.0} W of heat in the brake, over its {limit_w} W (limits.slip_power_w); lower --rpm, or --max-current with a smaller limits.load_nm"
+    )]
+    TooHot { load_nm: f64, speed_rpm: f64, power_w: f64, limit_w: f64 },
+}
+
+/// Runs the command.
+pub fn main(args: &Args) -> Exit {
+    let (setup, plan) = match prepare(args) {
+        Ok(prepared) => prepared,
+        Err(error) => return fail(Exit::BadInput, error.as_ref()),
+    };
+    let rig = setup.profile.clone();
+    let mean_ratio = setup.model.pair.closure();
+    let running = stop::Running::register();
+    let swept = Rc::new(RefCell::new(Swept::default()));
+    let outcome = execute(args, setup, &plan, &swept);
+    drop(running);
+    match outcome {
+        Err(error) => {
+            eprintln!("error: {error}");
+            Exit::Failed
+        }
+        Ok(outcome) => {
+            outcome.troubles.iter().for_each(|trouble| eprintln!("error: {trouble}"));
+            match &outcome.halt {
+                Some(halt @ Halt::Operator) => fail(Exit::Stopped, halt),
+                Some(halt) => fail(Exit::Halted, halt),
+                None => conclude(args, &rig, &plan, mean_ratio, &swept.borrow()),
+            }
+        }
+    }
+}
+
+fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>> {
+    let profile = match &args.profile {
+        Some(path) => Profile::load(path)?,
+        None => Profile::simulated(),
+    };
+    session::check_drivers(&profile)?;
+    let limits = &profile.limits;
+    let refuse = |option, value, unit, expected: String| Err(Refusal::Value { option, value, unit, expected });
+    let known = profile.brake.current_a(limits.load_nm).unwrap_or(profile.brake.current_limit_a);
+    let max_a = args.max_current.unwrap_or(known);
+    if !(max_a > 0.0 && max_a <= profile.brake.current_limit_a) {
+        let expected = format!("over 0 and at most brake.current_limit_a = {}", profile.brake.current_limit_a);
+        refuse("--max-current", max_a, "A", expected)?;
+    }
+    if !(args.rpm > 0.0 && args.rpm <= limits.speed_rpm) {
+        refuse("--rpm", args.rpm, "rpm", format!("over 0 and at most limits.speed_rpm = {}", limits.speed_rpm))?;
+    }
+    if !(0.0..=50.0).contains(&args.torque_uncertainty) {
+        refuse("--torque-uncertainty", args.torque_uncertainty, "%", "from 0 to 50".into())?;
+    }
+    if args.rated_torque <= 0.0 {
+        refuse("--rated-torque", args.rated_torque, "N·m", "over 0".into())?;
+    }
+    let power_w = slip_power_w(limits.load_nm, args.rpm);
+    if power_w > limits.slip_power_w {
+        let (load_nm, limit_w) = (limits.load_nm, limits.slip_power_w);
+        return Err(Box::new(Refusal::TooHot { load_nm, speed_rpm: args.rpm, power_w, limit_w }));
+    }
+    std::fs::create_dir_all(&args.logs)?;
+    let (pair_toml, model) = pair::load(None)?;
+    let sweep = SweepPlan {
+        currents_a: (1..=args.points).map(|n| max_a * f64::from(n) / f64::from(args.points)).collect(),
+        speed_rpm: args.rpm,
+        turns: args.turns,
+        repeats: args.repeats,
+        rated_torque_nm: args.rated_torque,
+        rate_hz: RATE_HZ,
+    };
+    let plan = Plan {
+        directions: vec![Direction::Ccw],
+        loads_nm: vec![0.0],
+        speed_rpm: args.rpm,
+        revolutions: f64::from(args.turns),
+        rate_hz: RATE_HZ,
+        accept_no_watchdog: false,
+    };
+    let note = "calibration of the brake".into();
+    let setup = Setup {
+        path: session::log_path(&args.logs, &plan),
+        profile,
+        model,
+        head: LogHead { operator: args.operator.clone(), note, pair_toml, plan_toml: None },
+    };
+    Ok((setup, sweep))
+}
+
+fn execute(args: &Args, setup: Setup, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<Outcome, String> {
+    let simulated = setup.profile.in_process();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(simulated).build();
+    let runtime = runtime.map_err(|error| error.to_string())?;
+    LocalSet::new().block_on(&runtime, async {
+        let stop = StopRequests::listen().map_err(|error| format!("signals: {error}"))?;
+        let links = if simulated {
+            let mut spec = sim::spec(&setup.model, &[]).map_err(|error| error.to_string())?;
+            sim::mount_discs(&mut spec, &setup.profile);
+            sim::start_in_process(&spec, RATE_HZ, args.seed).map_err(|error| error.to_string())?
+        } else {
+            Links::default()
+        };
+        let clock = if simulated { Clock::simulated() } else { Clock::real() };
+        let options = session::writer_options(&setup.profile);
+        let recorder = Recorder::create(&setup.path, options, &setup.profile.log).map_err(|error| error.to_string())?;
+        let conditions = RunMetadata {
+            direction: Direction::Ccw.to_string(),
+            speed_rpm: vec![plan.speed_rpm],
+            ..RunMetadata::default()
+        };
+        setup.head.describe(&recorder, &setup.profile, conditions, clock);
+        let Setup { profile, model, .. } = setup;
+        let progress = Progress::new(0.0, true);
+        let frame = Frame { profile, model, recorder, progress, links, clock, stop };
+        let sweep = async |rig: &mut Rig| brake_sweep::execute(rig, plan, swept).await;
+        Ok(session::with_rig(frame, async |rig| session::once(rig, sweep).await).await)
+    })
+}
+
+fn conclude(args: &Args, rig: &Profile, plan: &SweepPlan, mean_ratio: f64, swept: &Swept) -> Exit {
+    let stated = Stated {
+        drag_nm: args.drag.unwrap_or(rig.brake.rising[0][1]),
+        drag_uncertainty_nm: args.drag_uncertainty,
+        torque_uncertainty_ratio: args.torque_uncertainty / 100.0,
+        resolution_nm: swept.resolution_nm,
+        mean_ratio,
+        step_up: rig.brake.step_up,
+    };
+    let curves = match brake_curves(&swept.sweeps, &stated) {
+        Ok(curves) => curves,
+        Err(error) => return fail(Exit::Incomplete, &error),
+    };
+    // A file that people read: more places than the uncertainty has would be noise.
+    let places = |value: f64, places: i32| (value * 10f64.powi(places)).round() / 10f64.powi(places);
+    let points = |branch: &[BrakePoint]| {
+        branch
+            .iter()
+            .map(|p| [places(p.current_a, 5), places(p.torque_nm, 4), places(p.uncertainty_nm, 4)])
+            .collect::<Vec<_>>()
+    };
+    let brake = BrakeCalibration {
+        date: date(),
+        rig: rig.name.clone(),
+        method: format!(
+            "mean torque of the servo (rated {} N·m, ±{} %) over {} whole turns a current, {} ways up and down; drag {} N·m ± {} N·m stated",
+            args.rated_torque,
+            args.torque_uncertainty,
+            plan.turns,
+            plan.repeats,
+            stated.drag_nm,
+            stated.drag_uncertainty_nm
+        ),
+        coverage_factor: COVERAGE,
+        speed_rpm: plan.speed_rpm,
+        temperature_c: swept.temperature_c,
+        rising: points(&curves.rising),
+        falling: points(&curves.falling),
+    };
+    let saved = Calibration::load_or_new(&args.output.out).and_then(|mut calibration| {
+        calibration.brake = Some(brake.clone());
+        calibration.save(&args.output.out)
+    });
+    if let Err(error) = saved {
+        return fail(Exit::Failed, &error);
+    }
+    let told = json!({
+        "schema": "rigd.calibrate/1", "what": "brake", "file": args.output.out.display().to_string(), "brake": brake,
+    });
+    let mut text = format!("{:>9}  {:>24}  {:>24}\n", "A", "rising, N·m", "falling, N·m");
+    for (up, down) in brake.rising.iter().zip(&brake.falling) {
+        text.push_str(&format!(
+            "{:>9.4}  {:>14.3} ± {:>6.3}  {:>14.3} ± {:>6.3}\n",
+            up[0], up[1], up[2], down[1], down[2]
+        ));
+    }
+    text.push_str(&format!(
+        "written to {}; name it in the profile: calibration = \"…\", or with rigd run --calibration",
+        args.output.out.display()
+    ));
+    args.output.tell(&told, &text);
+    Exit::Done
+}

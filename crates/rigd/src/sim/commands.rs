@@ -1,0 +1,81 @@
+//! Hands on the simulated rig: commands from standard input press its emergency stop, heat its brake, and so on.
+
+use std::cell::RefCell;
+use std::io::BufRead as _;
+use std::rc::Rc;
+
+use tokio::sync::mpsc::unbounded_channel;
+
+use super::world::World;
+
+/// A thing to do to the rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Command {
+    /// Press the emergency stop, or release it.
+    EmergencyStop(bool),
+    /// Make the brake's sensor show so much more, °C.
+    Heat(f64),
+    /// Make the drive one without a watchdog.
+    NoWatchdog,
+    /// Cut the counter box's power for an instant.
+    RestartCounter,
+}
+
+impl Command {
+    /// Reads a line; `None` for none of these.
+    #[must_use]
+    pub fn parse(line: &str) -> Option<Self> {
+        match line.split_whitespace().collect::<Vec<_>>()[..] {
+            ["estop", "press"] => Some(Self::EmergencyStop(true)),
+            ["estop", "release"] => Some(Self::EmergencyStop(false)),
+            ["heat", celsius] => celsius.parse().ok().filter(|value: &f64| value.is_finite()).map(Self::Heat),
+            ["no-watchdog"] => Some(Self::NoWatchdog),
+            ["counter", "restart"] => Some(Self::RestartCounter),
+            _ => None,
+        }
+    }
+
+    /// Does it.
+    pub fn perform(self, world: &mut World) {
+        match self {
+            Self::EmergencyStop(pressed) => world.press_emergency_stop(pressed),
+            Self::Heat(by_c) => world.heat_brake_by(by_c),
+            Self::NoWatchdog => world.take_watchdog_away(),
+            Self::RestartCounter => world.restart_counter(),
+        }
+    }
+}
+
+/// Listens to standard input from now on; needs a local task set.
+pub fn listen(world: &Rc<RefCell<World>>) {
+    let (sender, mut lines) = unbounded_channel();
+    // A thread, for reading a terminal cannot be waited for; it ends with the input or with the process.
+    std::thread::spawn(move || {
+        let _ = std::io::stdin().lock().lines().map_while(Result::ok).try_for_each(|line| sender.send(line));
+    });
+    let world = Rc::clone(world);
+    tokio::task::spawn_local(async move {
+        while let Some(line) = lines.recv().await {
+            match Command::parse(&line) {
+                Some(command) => command.perform(&mut world.borrow_mut()),
+                None => eprintln!(
+                    "'{line}' is no command; there are: estop press|release, heat CELSIUS, no-watchdog, counter restart"
+                ),
+            }
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines() {
+        assert_eq!(Command::parse(" estop  press "), Some(Command::EmergencyStop(true)));
+        assert_eq!(Command::parse("heat 80.5"), Some(Command::Heat(80.5)));
+        for wrong in ["", "estop", "heat much", "heat NaN", "counter"] {
+            assert_eq!(Command::parse(wrong), None, "{wrong}");
+        }
+    }
+}
