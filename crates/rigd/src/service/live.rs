@@ -112,7 +112,7 @@ impl Live {
         })
     }
 
-    /// `rigd.te/1`: points from number `since` on, at most [`ANSWER`], the newest where there are more.
+    /// `rigd.te/1`: points from number `since` on, at most `ANSWER`, the newest where there are more.
     #[must_use]
     pub fn points(&self, since: u64) -> Value {
         let from = since.max(self.next_point.saturating_sub(ANSWER as u64));

@@ -2,11 +2,11 @@
 //!
 //! Well-kept masters return a late answer as the value of the next request; the rules here exist so that this cannot happen:
 //!
-//! 1. a line has one owner, a task ([`owner`]); what it begins it ends, whoever stops waiting;
+//! 1. a line has one owner, a task (`owner`); what it begins it ends, whoever stops waiting;
 //! 2. silence before and after each frame; bytes that come when none are due are counted and thrown away;
 //! 3. after any time-out, damage or stray byte the line is drained until it has been silent;
 //! 4. an answer must match unit, function, length and echo (`wire::modbus::ClientDecoder`);
-//! 5. consecutive reads are of different lengths: none is sent whose answer could be that of an earlier request ([`memory`]);
+//! 5. consecutive reads are of different lengths: none is sent whose answer could be that of an earlier request (`memory`);
 //! 6. writes are read back, and written again once when they read otherwise.
 //!
 //! What is left: an answer later than [`Horizon`] that also overtakes the order of the line, and damage that a CRC of 16 bits
