@@ -87,7 +87,7 @@ pub struct Audit {
     pub drift_ppm: Option<f64>,
     /// Largest delay of a batch beyond the fastest one near it, ms.
     pub largest_delay_ms: f64,
-    /// Every fault, at most [`MAX_FINDINGS`] of a kind.
+    /// Every fault, at most `MAX_FINDINGS` of a kind.
     pub findings: Vec<Finding>,
     /// Findings that were not listed.
     pub more_findings: u64,
