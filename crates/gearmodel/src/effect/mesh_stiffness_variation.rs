@@ -60,7 +60,7 @@ impl Effect for MeshStiffnessVariation {
         let weight = if let [duty, start] = shape[..] {
             if (at.pitches - start).rem_euclid(1.0) < duty { 1.0 - duty } else { -duty }
         } else {
-            f64::from(u8::from(rig.teeth_in_contact(at).count() < 2)) - rig.single_pair_duty(at)
+            f64::from(u8::from(rig.teeth_in_contact(at, 0.0).count() < 2)) - rig.single_pair_duty(at)
         };
         row[0] = -at.sense * at.load_nm * weight / (at.arm_mm * at.arm_mm);
     }

@@ -4,7 +4,8 @@
 //! Z1 = Z2 a driver tooth always meets the same driven one, and d_j is the sum of both.
 //!
 //! The trace is linear in d once it is known which pair carries. The shape holds the table that decides it (empty: all pairs
-//! in contact share alike); `refine` moves it to the table found.
+//! in contact share alike) and how far the tips reach, which decides when; `refine` moves the table to the one found. Tips as cut
+//! are chamfered, relieved or a little long: their reach is found from the data, 0 for the nominal tips, 1 for those of a rack.
 
 use std::f64::consts::TAU;
 
@@ -28,6 +29,17 @@ fn wave(n: usize, j: usize, teeth: usize) -> f64 {
     }
     let scale = (2.0 / teeth as f64).sqrt();
     if n.is_multiple_of(2) { scale * angle_rad.cos() } else { scale * angle_rad.sin() }
+}
+
+/// Furthest reach tried on either side of the nominal tips', and first step on the way there.
+const FURTHEST: f64 = 1.5;
+const REACH_STEP: f64 = 0.5;
+/// Steps of the search at which the reach is moved too.
+const REACH_FROM: f64 = 0.1;
+
+/// Reach of a shape.
+fn reach(shape: &Shape, teeth: usize) -> f64 {
+    shape.get(2 * teeth).copied().unwrap_or(0.0)
 }
 
 /// Displacements by tooth, ccw flanks then cw flanks, from the waves' amplitudes.
@@ -62,8 +74,19 @@ impl Effect for PitchErrors {
         2 * (teeth(rig) - 1)
     }
 
-    fn refine(&self, rig: &Rig, _shape: &Shape, beta: &[f64]) -> Option<Shape> {
-        Some(table(beta, teeth(rig)))
+    fn neighbours(&self, shape: &Shape, step: f64) -> Vec<Shape> {
+        // Before a table is known all pairs share alike.
+        let Some((reach, table)) = shape.split_last().filter(|_| step > REACH_FROM) else { return Vec::new() };
+        [-1.0, 1.0]
+            .map(|side: f64| (reach + side * step * REACH_STEP).clamp(-FURTHEST, FURTHEST))
+            .map(|other| table.iter().copied().chain([other]).collect())
+            .into()
+    }
+
+    fn refine(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> Option<Shape> {
+        let mut refined = table(beta, teeth(rig));
+        refined.push(reach(shape, teeth(rig)));
+        Some(refined)
     }
 
     fn grain(&self) -> Grain {
@@ -90,27 +113,33 @@ impl Effect for PitchErrors {
             }
         };
         if shape.is_empty() {
-            let pairs = rig.teeth_in_contact(at).count().max(1) as f64;
-            rig.teeth_in_contact(at).for_each(|tooth| add(tooth, 1.0 / pairs));
+            let pairs = rig.teeth_in_contact(at, 0.0).count().max(1) as f64;
+            rig.teeth_in_contact(at, 0.0).for_each(|tooth| add(tooth, 1.0 / pairs));
         } else {
             let lead = |tooth: &usize| at.sense * shape[side * teeth + tooth];
-            if let Some(tooth) = rig.teeth_in_contact(at).max_by(|a, b| lead(a).total_cmp(&lead(b))) {
+            if let Some(tooth) =
+                rig.teeth_in_contact(at, reach(shape, teeth)).max_by(|a, b| lead(a).total_cmp(&lead(b)))
+            {
                 add(tooth, 1.0);
             }
         }
     }
 
-    fn parameters(&self, rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let teeth = teeth(rig);
         let mut ccw = table(&found.beta, teeth);
         let cw = ccw.split_off(teeth);
-        [("ccw_mm", ccw), ("cw_mm", cw)]
-            .map(|(name, values)| Parameter { name, value: Value::Table(values), std: None, unit: "mm" })
-            .into()
+        let tables = [("ccw_mm", ccw), ("cw_mm", cw)].map(|(name, values)| Parameter {
+            name,
+            value: Value::Table(values),
+            std: None,
+            unit: "mm",
+        });
+        tables.into_iter().chain([Parameter::grid("tip_reach", reach(shape, teeth), "")]).collect()
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {
-        &["ccw_mm", "cw_mm"]
+        &["ccw_mm", "cw_mm", "tip_reach"]
     }
 
     fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
@@ -123,6 +152,8 @@ impl Effect for PitchErrors {
                 (0..teeth - 1).map(|n| errors_mm.iter().enumerate().map(|(j, x)| x * wave(n, j, teeth)).sum::<f64>()),
             );
         }
-        Ok((table(&beta, teeth), beta))
+        let mut shape = table(&beta, teeth);
+        shape.push(given.number_or("tip_reach", 0.0)?);
+        Ok((shape, beta))
     }
 }

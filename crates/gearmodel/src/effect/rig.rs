@@ -1,6 +1,6 @@
 //! The rig as documented: what effects are linearised about.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::Station;
 use crate::contact::ContactModel;
@@ -130,15 +130,20 @@ impl Rig {
         }
     }
 
-    /// Driver teeth in nominal contact.
-    pub fn teeth_in_contact(&self, at: &Station) -> impl Iterator<Item = usize> + '_ {
+    /// Driver teeth in contact where tips reach as far as `reach` says: 0 for the nominal tips, 1 for those of a rack, the longest
+    /// there are, less than 0 for tips that are relieved.
+    pub fn teeth_in_contact(&self, at: &Station, reach: f64) -> impl Iterator<Item = usize> + '_ {
+        // A rack's contact point stands u·π m cos α sin α from the pitch line.
+        let (sin, cos) = self.pair().pressure_angle_rad().sin_cos();
+        let of_rack = self.pair().addendum() / (PI * cos * sin);
         let spans = &self.spans[usize::from(at.sense < 0.0)];
         let (pitches, near, teeth) = (at.pitches, at.pitches.floor() as i64, spans.len() as i64);
         (near - 1..=near + 2).filter_map(move |tooth| {
             let index = usize::try_from(tooth.checked_rem_euclid(teeth)?).ok()?;
             let from_pitch_point = pitches - tooth as f64;
             let span = spans[index];
-            (span.from <= from_pitch_point && from_pitch_point <= span.to).then_some(index)
+            let (from, to) = (span.from - reach * (of_rack + span.from), span.to + reach * (of_rack - span.to));
+            (from <= from_pitch_point && from_pitch_point <= to).then_some(index)
         })
     }
 

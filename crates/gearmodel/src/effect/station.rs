@@ -138,6 +138,8 @@ pub struct Plan {
     pub duration_s: f64,
     /// Runs.
     pub runs: usize,
+    /// When each begins, s since the campaign's earliest sample.
+    pub starts_s: Vec<f64>,
     /// Revolutions of the driver in all.
     pub revolutions: f64,
     /// Part of its turn that each shaft covers, at most 1: input, output.

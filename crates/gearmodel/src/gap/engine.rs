@@ -10,12 +10,12 @@ use super::knocks::Knocks;
 use super::line_phase::{LineError, LinePhase};
 use super::noise::{FIRST_RUN_RATIO, Noise, Whitened};
 use super::nominal::Nominal;
-use super::pool::{Cause, Pool};
+use super::pool::{Cause, Pool, STEPS};
 use super::predict::{Found, FoundEffect};
 use super::reduce::{ReducedRun, Reducer, Sample};
 use super::search::{Allowed, Model, Search};
 use super::unknown::Pattern;
-use super::{events, evidence, interpolation, knocks, locate, next, shrink};
+use super::{events, evidence, ghosts, interpolation, knocks, locate, next, shrink, slow_tone};
 use crate::effect::{Accumulates, Estimate, INTERPOLATION, LIBRARY, Rig, by_name};
 use crate::recording::Recording;
 use crate::{Direction, NominalModel};
@@ -26,14 +26,18 @@ const RUN_RATIOS: [f64; 6] = [0.02, 0.08, 0.3, 1.0, 3.0, 10.0];
 const RUN_RATIO_SPREAD: f64 = 1.5;
 /// Evidence from which a wave that does not close with the turn is taken into the pool, nats.
 const WANDERING_NATS: f64 = 8.0;
+/// Most times that an event is fitted under the scatter that it left, and the part of the scatter's square from which it is not worth
+/// another.
+const EVENT_ROUNDS: usize = 5;
+const EVENT_QUIETER: f64 = 0.9;
 /// A set with an event that alone scores so much less than the best is not searched about, nats.
 const NEAR_NATS: f64 = 30.0;
+/// The same where the best model has nothing that the event could stand in for, nats.
+const NEARER_NATS: f64 = 10.0;
 /// Blocks smaller than this part of the largest are left out while its shape is moved.
 const LARGE: f64 = 0.12;
 /// Steps in which shapes are moved, in parts of their grid's.
 const SHARPENING_STEPS: [f64; 6] = [1.0, 0.6, 0.3, 0.15, 0.07, 0.03];
-/// First step of a wandering wave's order when it is sharpened, in parts of what the angle covered tells apart.
-const ORDER_STEP: f64 = 0.4;
 /// What a moved shape must gain, nats: a fifth of its standard deviation.
 const SHARPER_NATS: f64 = 0.02;
 /// Rounds of: search, look for events, sharpen shapes, estimate the noise anew.
@@ -315,6 +319,8 @@ impl<'a> Engine<'a> {
         causes.extend(Pattern::all(&grid.plan).into_iter().map(Cause::Unknown));
         pool.add(&grid, rig, causes);
         let noise = Noise::estimate(&grid, &pool, &[]);
+        let ghosts = ghosts::find(&grid, &noise, &grid.rho_rad);
+        pool.add(&grid, rig, ghosts.into_iter().map(Cause::Unknown).collect());
         let whitened = Whitened { gram: nalgebra::DMatrix::zeros(0, 0), log_det: 0.0 };
         Self { rig, aside, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None }
     }
@@ -323,7 +329,10 @@ impl<'a> Engine<'a> {
     fn solve(&mut self) {
         for round in 0..ROUNDS {
             self.search(false);
-            let changed = self.sharpen() | self.look_for_events() | (round == 0 && self.look_for_wandering_waves());
+            let changed = self.sharpen()
+                | self.look_for_events()
+                | (round == 0 && self.look_for_what_runs_on())
+                | (round == 0 && self.look_for_wandering_waves());
             let before = self.noise.floor_rad2();
             self.estimate_noise();
             let moved = (self.noise.floor_rad2() / before).ln().abs();
@@ -453,7 +462,7 @@ impl<'a> Engine<'a> {
                 shapes.map(|shape| Cause::Effect { effect, number, shape, cost_nats }).collect()
             }
             Cause::Unknown(pattern) => {
-                let nearer = pattern.nearer(step * ORDER_STEP / self.grid.span_rev().max(1.0));
+                let nearer = pattern.nearer(step, self.grid.span_rev());
                 nearer.into_iter().map(Cause::Unknown).collect()
             }
         };
@@ -487,9 +496,7 @@ impl<'a> Engine<'a> {
         let Some(best) = &self.best else { return Vec::new() };
         let steady = |b: &usize| match &self.pool.blocks[*b].cause {
             Cause::Effect { effect, shape, .. } => effect.signature_of(self.rig, shape).accumulates == Accumulates::No,
-            Cause::Unknown(pattern) => {
-                !matches!(pattern, Pattern::RunLevels { .. } | Pattern::Level { .. } | Pattern::Step { .. })
-            }
+            Cause::Unknown(pattern) => !pattern.moves_levels(),
         };
         best.fit.set.iter().copied().filter(steady).collect()
     }
@@ -507,8 +514,8 @@ impl<'a> Engine<'a> {
         let found = events::find(&self.grid, &self.pool, &self.noise, &amplitudes, &steady);
         let mut causes = Vec::new();
         causes.extend(found.patterns.into_iter().map(Cause::Unknown));
-        let allowed = !self.options.exclude.iter().any(|name| name == "count_loss");
-        let count_loss = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.name() == "count_loss");
+        let allowed = !self.options.exclude.iter().any(|name| name == STEPS);
+        let count_loss = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.name() == STEPS);
         if let Some((number, effect)) = count_loss.filter(|_| allowed) {
             causes.extend(found.steps.into_iter().map(|times_s| {
                 let [any, each] = events::STEPS_COST_NATS;
@@ -519,7 +526,36 @@ impl<'a> Engine<'a> {
         causes.retain(|cause| self.block_of(cause).is_none());
         let changed = !causes.is_empty();
         for block in self.pool.add(&self.grid, self.rig, causes) {
-            self.weigh_event(block);
+            if let Some(noise) = self.noise_with(&self.pool.blocks[block].cause) {
+                self.weigh_event(block, noise);
+            }
+        }
+        changed
+    }
+
+    /// Looks for levels that settle in each run, swing or wander with time, and takes into the pool what is worth it.
+    fn look_for_what_runs_on(&mut self) -> bool {
+        let (settling, walk) = Pattern::running_on(&self.grid.plan);
+        let found: Vec<Cause> = self.steady_set().iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
+        let mut few = self.pool.beside(&self.grid);
+        let set = few.add(&self.grid, self.rig, found);
+        let tried = few.add(&self.grid, self.rig, settling.into_iter().map(Cause::Unknown).collect());
+        let whitened = self.noise.whiten(&self.grid, &few);
+        let Some(fit) = evidence::fit(&few, &whitened, &set, &[]) else { return false };
+        let gains = evidence::scan(&few, &whitened, &fit, &tried);
+        let settles = tried.iter().zip(gains).max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, gain)| *gain > 0.0);
+        let settles = settles.map(|(block, _)| few.blocks[*block].cause.clone());
+        let trace = few.trace(&self.grid, &fit.amplitudes());
+        let rest: Vec<f64> = self.grid.rho_rad.iter().zip(&trace).map(|(y, m)| y - m).collect();
+        let swings = slow_tone::strongest(&self.grid, &self.noise, &rest);
+        let mut changed = false;
+        for cause in settles.into_iter().chain(swings.into_iter().chain(walk).map(Cause::Unknown)) {
+            if let Some(noise) = self.noise_with(&cause) {
+                changed = true;
+                for block in self.pool.add(&self.grid, self.rig, vec![cause]) {
+                    self.weigh_event(block, noise.clone());
+                }
+            }
         }
         changed
     }
@@ -527,11 +563,9 @@ impl<'a> Engine<'a> {
     /// Looks for waves over the driver's angle that do not close with its turn, in a pool of its own, and takes the best into the
     /// pool where it is worth it.
     fn look_for_wandering_waves(&mut self) -> bool {
+        let span_rev = self.grid.span_rev();
+        let mut patterns = Pattern::wandering(span_rev);
         let mut step = 1.0;
-        let mut patterns = Pattern::wandering(self.grid.span_rev());
-        if let [Pattern::Order { order: a, .. }, Pattern::Order { order: b, .. }, ..] = &patterns[..] {
-            step = b - a;
-        }
         let found: Vec<Cause> =
             self.best.iter().flat_map(|m| &m.fit.set).map(|b| self.pool.blocks[*b].cause.clone()).collect();
         let mut best: Option<(Pattern, f64)> = None;
@@ -549,39 +583,54 @@ impl<'a> Engine<'a> {
                 }
             }
             let Some((pattern, _)) = best.as_ref().filter(|(_, gain)| *gain > WANDERING_NATS) else { return false };
-            patterns = pattern.nearer(step);
+            patterns = pattern.nearer(step, span_rev);
             step *= 0.5;
         }
         let Some((pattern, _)) = best else { return false };
         let added = self.pool.add(&self.grid, self.rig, vec![Cause::Unknown(pattern)]);
         for block in &added {
-            self.weigh_event(*block);
+            if let Some(noise) = self.noise_with(&self.pool.blocks[*block].cause) {
+                self.weigh_event(*block, noise);
+            }
         }
         !added.is_empty()
     }
 
-    /// Steps and tones pass for scatter until they are taken off: a model with the event is weighed under the noise that it
-    /// leaves, against the best model under its own.
-    fn weigh_event(&mut self, block: usize) {
-        let mut set = self.steady_set();
-        set.push(block);
-        let before = self.best.as_ref().map_or(f64::NEG_INFINITY, |m| m.score);
-        // The set alone first, in a pool of its own: most events that are none fail here.
-        let causes: Vec<Cause> = set.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
+    /// Steps and tones pass for scatter until they are taken off: the noise that one leaves beside what does not move the level,
+    /// where that alone comes near the best model.
+    fn noise_with(&self, event: &Cause) -> Option<Noise> {
+        let steady = self.steady_set();
+        let best = self.best.as_ref()?;
+        let mut causes: Vec<Cause> = steady.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
+        causes.push(event.clone());
+        // In a pool of its own: most events that are none fail here.
         let mut few = self.pool.beside(&self.grid);
         let own = few.add(&self.grid, self.rig, causes);
-        let whitened = self.noise.whiten(&self.grid, &few);
-        let Some(fit) = evidence::fit(&few, &whitened, &own, &[]) else { return };
-        let mut noise = Noise::estimate(&self.grid, &few, &fit.amplitudes());
-        noise.run_ratio = self.noise.run_ratio;
-        noise.run_ratio = self.best_run_ratio(&noise, &few, &fit);
-        let alone = Search::new(&few, &noise.whiten(&self.grid, &few), &self.options.known).model(own, None);
-        if alone.is_none_or(|model| model.score < before - NEAR_NATS) {
-            return;
+        let mut noise = self.noise.clone();
+        // What passes for scatter holds its own amplitudes down until the scatter is less.
+        for _ in 0..EVENT_ROUNDS {
+            let before = noise.floor_rad2();
+            let fit = evidence::fit(&few, &noise.whiten(&self.grid, &few), &own, &[])?;
+            let run_ratio = noise.run_ratio;
+            noise = Noise::estimate(&self.grid, &few, &fit.amplitudes());
+            noise.run_ratio = run_ratio;
+            noise.run_ratio = self.best_run_ratio(&noise, &few, &fit);
+            if noise.floor_rad2() > EVENT_QUIETER * before {
+                break;
+            }
         }
+        let alone = Search::new(&few, &noise.whiten(&self.grid, &few), &self.options.known).model(own, None)?;
+        let room = if steady.len() < best.fit.set.len() { NEAR_NATS } else { NEARER_NATS };
+        (alone.score > best.score - room).then_some(noise)
+    }
+
+    /// Weighs a model with an event under the noise that it leaves against the best model under its own.
+    fn weigh_event(&mut self, block: usize, noise: Noise) {
+        let mut set = self.steady_set();
+        set.push(block);
         let whitened = noise.whiten(&self.grid, &self.pool);
         let with_event = Search::new(&self.pool, &whitened, &self.options.known).climb(set, Allowed::All);
-        if let Some(model) = with_event.filter(|model| model.score > before) {
+        if let Some(model) = with_event.filter(|model| self.best.as_ref().is_none_or(|best| model.score > best.score)) {
             self.best = Some(model);
             self.noise = noise;
             self.whitened = whitened;

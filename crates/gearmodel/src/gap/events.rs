@@ -121,14 +121,19 @@ fn single_steps(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Pattern> {
 }
 
 /// Mean of a sector of a revolution.
-struct Sector {
+pub(super) struct Sector {
     run: usize,
     start_s: f64,
-    mean_rad: f64,
-    variance_rad2: f64,
+    /// Mean time of its samples, s since the campaign's start.
+    pub middle_s: f64,
+    /// Mean, rad.
+    pub mean_rad: f64,
+    /// Its variance, rad².
+    pub variance_rad2: f64,
 }
 
-fn sectors(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Sector> {
+/// Means of all sectors in turn.
+pub(super) fn sectors(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Sector> {
     // Waves above the sector's own length average out; the lower ones are as good as independent from turn to turn.
     let low: f64 = noise.order_rad2.iter().take(4).enumerate().map(|(n, v)| if n == 0 { *v } else { 2.0 * v }).sum();
     let mut sectors = Vec::new();
@@ -144,6 +149,7 @@ fn sectors(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Sector> {
             sectors.push(Sector {
                 run: revolution.run,
                 start_s: grid.places[chunk[0]].time_s,
+                middle_s: mean(&|p| grid.places[p].time_s),
                 mean_rad: mean(&|p| rest[p]),
                 variance_rad2: noise.white_rad2 / weight + low,
             });

@@ -15,6 +15,9 @@ const SMALLEST_SCALE_RAD: f64 = 1e-6;
 /// Blocks wider than this are scanned on a coarser grid of scales: 2, 8, 32, 128 µrad.
 pub(super) const WIDE: usize = 16;
 const WIDE_SCALES: i32 = 4;
+/// Least and largest scale of a block of a set, rad.
+const LEAST_SCALE_RAD: f64 = 0.3e-6;
+const LARGEST_SCALE_RAD: f64 = 0.1;
 /// What the freedom of a scale costs: as on the grid, a third of whose points fit.
 const SCALE_COST: f64 = 1.3;
 /// Prior standard deviation of the zero, rad.
@@ -58,7 +61,16 @@ impl Fit {
     #[must_use]
     pub fn rms_rad(&self, pool: &Pool, n: usize) -> f64 {
         let place = self.place(pool, n);
-        self.mean.rows(place.start, place.len()).norm()
+        let weight = pool.products[(ZERO, ZERO)];
+        let mut square = 0.0;
+        for a in place.clone() {
+            for b in place.clone() {
+                let (m, n) = (self.columns[a], self.columns[b]);
+                let centred = pool.products[(m, n)] - pool.products[(m, ZERO)] * pool.products[(n, ZERO)] / weight;
+                square += self.mean[a] * self.mean[b] * centred / weight;
+            }
+        }
+        square.max(0.0).sqrt()
     }
 }
 
@@ -135,7 +147,7 @@ pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -
             // s² is what the amplitudes are expected to sum up to: |m|² + trace of their covariance.
             let square: f64 =
                 (first..first + width).map(|n| solved.mean[n] * solved.mean[n] + half.column(n).norm_squared()).sum();
-            let next = square.sqrt().clamp(0.3e-6, 1e-1);
+            let next = square.sqrt().clamp(LEAST_SCALE_RAD, LARGEST_SCALE_RAD);
             moved = moved.max((next / *scale).ln().abs());
             *scale = next;
             first += width;

@@ -139,6 +139,7 @@ impl Grid {
             let nominal = run.direction.sign() * run.speed_rpm * TAU / 60.0;
             let speed = if run.speed_rpm > 0.0 { nominal } else { mean_speed };
             speeds.push(speed.abs());
+            grid.plan.starts_s.push(first.time_s - start_s);
             grid.plan.senses[usize::from(run.direction == Direction::Cw)] = true;
             grid.plan.revolutions += way_of(run, &last);
             grid.add_run(rig, run, n, &RunFrame { turns: turns[n], merge, closes, start_s, mean_speed }, &mut ledger);

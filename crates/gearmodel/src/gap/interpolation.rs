@@ -17,6 +17,9 @@ const LINES: std::ops::Range<usize> = 700..CELLS / 3;
 const FOUND_NATS: f64 = 7.0;
 /// Samples are in step with the angle where their own spectrum has a line of this part of its sum.
 const IN_STEP: f64 = 0.15;
+/// A line stands alone where no other is more than this part of its power, its harmonics and its foot left out.
+const ALONE: f64 = 0.1;
+const BESIDE: usize = 20;
 /// The residual is freed of its mean over this part of a turn, or over so many samples where they are sparse.
 const WINDOW_RAD: f64 = TAU / 360.0;
 const WINDOW_SAMPLES: usize = 4;
@@ -70,15 +73,13 @@ pub fn search_lines(parts: &[Recording<'_>], nominal: &Nominal, known: [Option<f
         }
     }
     let transform = FftPlanner::new().plan_fft_forward(CELLS);
-    // Samples in step with one of the angles show every low order again at high ones: nothing is known of lines then.
-    for mut places in seen_at {
+    // Samples in step with one of the angles show every low order again at high ones: only what stands alone is a disc's line then.
+    let in_step = seen_at.into_iter().any(|mut places| {
         let samples: f64 = places.iter().map(|x| x.re).sum();
         transform.process(&mut places);
         let line = places[LINES.start / 4..CELLS / 2].iter().map(|x| x.norm()).fold(0.0, f64::max);
-        if line > IN_STEP * samples {
-            return known;
-        }
-    }
+        line > IN_STEP * samples
+    });
     let mut lines = known;
     for (encoder, mut values) in series.into_iter().enumerate() {
         if known[encoder].is_some() || power[encoder] <= 0.0 {
@@ -87,7 +88,10 @@ pub fn search_lines(parts: &[Recording<'_>], nominal: &Nominal, known: [Option<f
         transform.process(&mut values);
         let nats = |order: usize| values[order].norm_sqr() / power[encoder] - (LINES.len() as f64).ln();
         let strongest = LINES.max_by(|a, b| nats(*a).total_cmp(&nats(*b))).unwrap_or(LINES.start);
-        if nats(strongest) > FOUND_NATS {
+        let harmonic = |order: usize| order.is_multiple_of(strongest) || strongest.is_multiple_of(order);
+        let apart = |order: &usize| order.abs_diff(strongest) > BESIDE && !harmonic(*order);
+        let alone = || LINES.filter(apart).all(|order| values[order].norm_sqr() < ALONE * values[strongest].norm_sqr());
+        if nats(strongest) > FOUND_NATS && (!in_step || alone()) {
             // A wave of order 2 of the line may be the stronger one.
             let half = strongest / 2;
             let of_half = strongest % 2 == 0 && half >= LINES.start && nats(half) > 0.0;

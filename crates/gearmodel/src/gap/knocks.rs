@@ -8,11 +8,20 @@ use super::reduce::ReducedRun;
 /// How far a place must stand out, in robust standard deviations, to begin a knock, and how little for it to be over.
 const OUTSTANDING: f64 = 8.0;
 const QUIET: f64 = 2.5;
+/// Part of the RMS from which the standard deviation by the median says that it rings all the time, and how much higher peaks are then.
+const RINGING: f64 = 0.5;
+const RINGING_PEAKS: f64 = 1.5;
 /// Quiet places that end a knock.
 const QUIET_PLACES: usize = 6;
 /// Places on either side whose levels tell a step from a knock, and the part of its peak that a step leaves.
 const BESIDE: usize = 30;
 const STEP: f64 = 0.25;
+/// Times that they are looked for.
+const PASSES: usize = 4;
+/// Places from which a stretch at a run's beginning is no knock.
+const SETTLING: usize = 20;
+/// Part of it on one side.
+const ONE_SIDED: f64 = 0.9;
 /// What takes more than this part of the places is no knock.
 const MOST: f64 = 0.2;
 /// Median absolute deviation → standard deviation.
@@ -35,49 +44,95 @@ pub struct Knocks {
 
 /// Finds knocks and cuts their points out of the runs; `None` where there are none.
 pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
-    let Deviations { plain, beyond_climb: deviations } = deviations(grid)?;
-    // As a bin of mean weight would scatter.
-    let mean_weight = grid.samples / grid.places.len() as f64;
-    let even = |of: &[f64]| -> Vec<f64> {
-        of.iter().zip(&grid.weight).map(|(d, w)| d * (w / mean_weight).min(1.0).sqrt()).collect()
-    };
-    let mut sizes: Vec<f64> = even(&plain).into_iter().map(f64::abs).collect();
-    let middle = sizes.len() / 2;
-    let sigma_rad = (OF_MEDIAN * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(LEAST_RAD);
-    let even = even(&deviations);
-    let mut knocks = Knocks::default();
-    let mut cut = vec![false; deviations.len()];
-    for run in 0..grid.directions.len() {
-        let mut places = grid.revolutions.iter().filter(|r| r.run == run).map(|r| r.places.clone());
-        let Some(first) = places.next() else { continue };
-        let of_run = first.start..places.next_back().map_or(first.end, |last| last.end);
-        let mut at = of_run.start;
-        while let Some(begin) = (at..of_run.end).find(|p| even[*p].abs() > OUTSTANDING * sigma_rad) {
-            let window = window(&even, &of_run, begin, QUIET * sigma_rad);
-            at = window.end;
-            let peak_rad = window.clone().map(|p| deviations[p].abs()).fold(0.0, f64::max);
-            if leaves_a_step(&deviations, &of_run, &window, peak_rad) {
-                continue;
-            }
-            if knocks.count == 0 {
-                knocks.first_s = grid.places[begin].time_s;
-            }
-            knocks.count += 1;
-            knocks.peak_rad = knocks.peak_rad.max(peak_rad);
-            knocks.mean_square_rad2 +=
-                window.clone().map(|p| grid.weight[p] * deviations[p] * deviations[p]).sum::<f64>() / grid.samples;
-            cut[window].fill(true);
+    let mut cut = vec![false; grid.places.len()];
+    let mut found: Vec<Window> = Vec::new();
+    // Where they crowd, they stand in the medians that they are found by: once more without those that are known.
+    for _ in 0..PASSES {
+        let more = find(grid, &cut)?;
+        for window in &more {
+            cut[window.places.clone()].fill(true);
+        }
+        let none = more.is_empty();
+        found.extend(more);
+        if none || share(&cut) > MOST {
+            break;
         }
     }
-    let lost = cut.iter().filter(|cut| **cut).count();
-    if knocks.count == 0 || lost as f64 > MOST * cut.len() as f64 {
+    if found.is_empty() || share(&cut) > MOST {
         return None;
+    }
+    let mut knocks = Knocks { count: found.len(), first_s: f64::INFINITY, ..Knocks::default() };
+    for window in &found {
+        knocks.first_s = knocks.first_s.min(window.begin_s);
+        knocks.peak_rad = knocks.peak_rad.max(window.peak_rad);
+        knocks.mean_square_rad2 += window.square_rad2 / grid.samples;
+        // They ring on under the scatter.
+        let run = grid.places[window.places.start].run;
+        let tail = window.places.end..window.places.end + window.places.len() / 2;
+        for place in tail.take_while(|p| grid.places.get(*p).is_some_and(|at| at.run == run)) {
+            cut[place] = true;
+        }
     }
     for (run, places) in runs.iter_mut().zip(&grid.place_of_point) {
         let mut place = places.iter();
         run.points.retain(|_| place.next().is_none_or(|p| !cut[*p]));
     }
     Some(knocks)
+}
+
+fn share(cut: &[bool]) -> f64 {
+    cut.iter().filter(|cut| **cut).count() as f64 / cut.len() as f64
+}
+
+/// A stretch that stands out.
+struct Window {
+    places: std::ops::Range<usize>,
+    begin_s: f64,
+    peak_rad: f64,
+    /// Weighted sum of squares.
+    square_rad2: f64,
+}
+
+/// Knocks outside what is cut already; `None` where cells do not come again often enough.
+fn find(grid: &Grid, cut: &[bool]) -> Option<Vec<Window>> {
+    let Deviations { plain, beyond_climb: deviations } = deviations(grid, cut)?;
+    // As a bin of mean weight would scatter.
+    let mean_weight = grid.samples / grid.places.len() as f64;
+    let even = |of: &[f64]| -> Vec<f64> {
+        of.iter().zip(&grid.weight).map(|(d, w)| d * (w / mean_weight).min(1.0).sqrt()).collect()
+    };
+    let plain = even(&plain);
+    let even = even(&deviations);
+    let mut found = Vec::new();
+    for run in 0..grid.directions.len() {
+        let mut places = grid.revolutions.iter().filter(|r| r.run == run).map(|r| r.places.clone());
+        let Some(first) = places.next() else { continue };
+        let of_run = first.start..places.next_back().map_or(first.end, |last| last.end);
+        // A rig that shakes more under one condition than another is not knocked there.
+        let Some(Scatter { sigma_rad, outstanding_rad }) = scatter(&plain[of_run.clone()], &cut[of_run.clone()]) else {
+            continue;
+        };
+        let mut at = of_run.start;
+        while let Some(begin) = (at..of_run.end).find(|p| even[*p].abs() > outstanding_rad) {
+            let window = window(&even, &of_run, begin, QUIET * sigma_rad);
+            at = window.end;
+            let peak_rad = window.clone().map(|p| deviations[p].abs()).fold(0.0, f64::max);
+            // What is under way where the run begins and comes to rest from one side settles.
+            let settles = window.start < of_run.start + QUIET_PLACES
+                && window.len() > SETTLING
+                && one_sided(&deviations[window.clone()]);
+            if settles || leaves_a_step(&deviations, &of_run, &window, peak_rad) {
+                continue;
+            }
+            found.push(Window {
+                begin_s: grid.places[begin].time_s,
+                peak_rad,
+                square_rad2: window.clone().map(|p| grid.weight[p] * deviations[p] * deviations[p]).sum(),
+                places: window,
+            });
+        }
+    }
+    Some(found)
 }
 
 /// Residual of every place less the median of its cell over the revolutions.
@@ -88,11 +143,13 @@ struct Deviations {
     beyond_climb: Vec<f64>,
 }
 
-/// `None` where cells do not come again often enough.
-fn deviations(grid: &Grid) -> Option<Deviations> {
+/// `None` where cells do not come again often enough; what is cut deviates by nothing.
+fn deviations(grid: &Grid, cut: &[bool]) -> Option<Deviations> {
     let mut cells: Vec<Vec<f64>> = vec![Vec::new(); grid.cells.len()];
     for (place, cell) in grid.cell_of.iter().enumerate() {
-        cells[*cell].push(grid.rho_rad[place]);
+        if !cut[place] {
+            cells[*cell].push(grid.rho_rad[place]);
+        }
     }
     if grid.places.len() < 3 * grid.cells.len() {
         return None;
@@ -100,6 +157,9 @@ fn deviations(grid: &Grid) -> Option<Deviations> {
     let medians: Vec<f64> = cells
         .into_iter()
         .map(|mut values| {
+            if values.is_empty() {
+                return 0.0;
+            }
             values.sort_by(f64::total_cmp);
             0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2])
         })
@@ -108,10 +168,32 @@ fn deviations(grid: &Grid) -> Option<Deviations> {
         let next = |other: usize| medians.get(other).map_or(0.0, |m| (m - medians[cell]).abs());
         next(cell + 1).max(next(cell.wrapping_sub(1)))
     };
-    let plain: Vec<f64> = grid.cell_of.iter().zip(&grid.rho_rad).map(|(cell, rho)| rho - medians[*cell]).collect();
+    let plain: Vec<f64> = (grid.cell_of.iter().zip(&grid.rho_rad).zip(cut))
+        .map(|((cell, rho), cut)| if *cut { 0.0 } else { rho - medians[*cell] })
+        .collect();
     let beyond_climb =
         grid.cell_of.iter().zip(&plain).map(|(cell, d)| (d.abs() - climb(*cell)).max(0.0).copysign(*d)).collect();
     Some(Deviations { plain, beyond_climb })
+}
+
+/// How a run scatters.
+struct Scatter {
+    /// Standard deviation by the median.
+    sigma_rad: f64,
+    /// What stands out of it.
+    outstanding_rad: f64,
+}
+
+/// Of what is not cut; `None` where nothing is left.
+fn scatter(deviations: &[f64], cut: &[bool]) -> Option<Scatter> {
+    let mut sizes: Vec<f64> = deviations.iter().zip(cut).filter(|(_, cut)| !**cut).map(|(d, _)| d.abs()).collect();
+    let (count, middle) = (sizes.len() as f64, sizes.len() / 2);
+    let median_rad = (!sizes.is_empty()).then(|| *sizes.select_nth_unstable_by(middle, f64::total_cmp).1)?;
+    let sigma_rad = (OF_MEDIAN * median_rad).max(LEAST_RAD);
+    // Between knocks it is quiet; a rig that rings all the time has high peaks too.
+    let rms_rad = (sizes.iter().map(|d| d * d).sum::<f64>() / count).sqrt();
+    let rings = if sigma_rad > RINGING * rms_rad { RINGING_PEAKS } else { 1.0 };
+    Some(Scatter { sigma_rad, outstanding_rad: OUTSTANDING * rings * sigma_rad })
 }
 
 /// From where it begins to be loud to where it has been quiet for a while.
@@ -126,6 +208,12 @@ fn window(deviations: &[f64], run: &std::ops::Range<usize>, begin: usize, quiet_
         end = after + 1;
     }
     start..end
+}
+
+/// Whether nearly all of it lies on one side.
+fn one_sided(deviations: &[f64]) -> bool {
+    let (sum, total) = deviations.iter().fold((0.0, 0.0), |(sum, total), d| (sum + d, total + d.abs()));
+    f64::abs(sum) > ONE_SIDED * total
 }
 
 /// Whether the level before and after differs by a good part of the peak.

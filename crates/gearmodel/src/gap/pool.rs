@@ -16,6 +16,9 @@ use super::noise::WAVES;
 use super::unknown::Pattern;
 use crate::effect::{Effect, Grain, Rig, Shape, Station};
 
+/// The effect whose shapes are times of steps.
+pub(super) const STEPS: &str = "count_loss";
+
 /// What a block of columns stands for.
 #[derive(Clone)]
 pub enum Cause {
@@ -32,6 +35,19 @@ pub enum Cause {
     },
     /// A pattern that no effect of the library makes.
     Unknown(Pattern),
+}
+
+impl Cause {
+    /// True where beside one of them the other explains nothing: steps at times of one's choice follow any random walk.
+    #[must_use]
+    pub fn excludes(&self, other: &Self) -> bool {
+        let walks = |cause: &Self| matches!(cause, Self::Unknown(Pattern::RandomWalk { .. }));
+        let steps = |cause: &Self| match cause {
+            Self::Effect { effect, .. } => effect.name() == STEPS,
+            Self::Unknown(pattern) => matches!(pattern, Pattern::Step { .. }),
+        };
+        walks(self) && steps(other) || steps(self) && walks(other)
+    }
 }
 
 /// A block of unit-RMS columns in the pool.
@@ -102,6 +118,11 @@ impl Base {
     }
 }
 
+fn values(unit: &DMatrix<f64>, evolves: bool, transform: DMatrix<f64>) -> (Vec<Values>, DMatrix<f64>) {
+    let column = |column: Vec<f64>| if evolves { Values::Places(column) } else { Values::Cells(column) };
+    (unit.column_iter().map(|x| column(x.iter().copied().collect())).collect(), transform)
+}
+
 /// Traces smaller than this part of a block's largest direction are not seen under the plan.
 const UNSEEN: f64 = 1e-5;
 
@@ -134,6 +155,14 @@ impl Pool {
     #[must_use]
     pub fn width(&self) -> usize {
         self.columns.len()
+    }
+
+    /// RMS of the residual, its mean taken off, rad.
+    #[must_use]
+    pub fn residual_rms_rad(&self) -> f64 {
+        let weight = self.products[(1, 1)];
+        let mean = self.products[(0, 1)] / weight;
+        (self.products[(0, 0)] / weight - mean * mean).max(0.0).sqrt()
     }
 
     /// ZᵀWZ of every revolution.
@@ -232,6 +261,10 @@ impl Pool {
         if scale.max() < 1e-9 * size {
             return None;
         }
+        if matches!(cause, Cause::Unknown(pattern) if pattern.keeps_sizes()) {
+            let transform = DMatrix::identity(width, width) * (width as f64 / covariance.trace()).sqrt();
+            return Some(values(&(raw * transform[(0, 0)]), evolves, transform));
+        }
         let eigen = SymmetricEigen::new(covariance);
         let largest = eigen.eigenvalues.max();
         let kept: Vec<usize> = (0..width).filter(|n| eigen.eigenvalues[*n] > UNSEEN * UNSEEN * largest).collect();
@@ -244,15 +277,7 @@ impl Pool {
             }
             transform.set_column(to, &direction);
         }
-        let unit = raw * &transform;
-        let values = unit
-            .column_iter()
-            .map(|column| {
-                let column = column.iter().copied().collect();
-                if evolves { Values::Places(column) } else { Values::Cells(column) }
-            })
-            .collect();
-        Some((values, transform))
+        Some(values(&(raw * &transform), evolves, transform))
     }
 
     /// Adds columns with their sums.

@@ -28,6 +28,8 @@ const LINE_ODDS: f64 = 0.04;
 /// floor, the nominal and the noise model's.
 const INEXACT: f64 = 0.05;
 const INEXACT_OF_FLOOR: f64 = 0.08;
+/// A wandering level under this part of the floor may be scatter.
+const WANDERS_OF_FLOOR: f64 = 0.3;
 
 /// Largest probability of what may be no more than that.
 const INEXACT_PROBABILITY: f64 = 0.02;
@@ -100,7 +102,11 @@ impl Engine<'_> {
             .map(|f| f.rms_rad * f.rms_rad)
             .sum::<f64>();
         // What is too small to matter beside what was found, or beside what does not repeat.
-        let least_rad = least_rad(total_rad2 + explained_rad2, gap.floor_rad);
+        let unknown_rad2: f64 = (0..best.fit.set.len())
+            .filter(|n| matches!(self.pool.blocks[best.fit.set[*n]].cause, Cause::Unknown(_)))
+            .map(|n| best.fit.rms_rad(&self.pool, n).powi(2))
+            .sum();
+        let least_rad = least_rad(total_rad2 + unknown_rad2 + explained_rad2, gap.floor_rad);
         for finding in &mut findings {
             if finding.rms_rad < least_rad {
                 finding.probability = finding.probability.min(INEXACT_PROBABILITY);
@@ -364,8 +370,7 @@ impl Engine<'_> {
         let mut known = 0.0;
         let mut strongest: Option<(f64, &Pattern)> = None;
         for (n, b) in best.fit.set.iter().enumerate() {
-            let place = best.fit.place(&self.pool, n);
-            let size: f64 = best.fit.mean.rows(place.start, place.len()).norm_squared();
+            let size = best.fit.rms_rad(&self.pool, n).powi(2);
             match &self.pool.blocks[*b].cause {
                 Cause::Unknown(pattern) => {
                     square += size;
@@ -395,7 +400,9 @@ impl Engine<'_> {
             let location = Some(UnknownLocation { description: pattern.describe(), signature: pattern.signature() });
             return Unknown { probability: EVENT_PROBABILITY, rms_rad, location };
         }
-        // Effects are linearised and their shapes lie on grids: a small part of them may stay behind.
+        // Effects are linearised and their shapes lie on grids: a small part of them may stay behind. Scatter wanders too.
+        let wanders = strongest.is_some_and(|(_, pattern)| matches!(pattern, Pattern::RandomWalk { .. }));
+        let least_rad = if wanders { least_rad.max(WANDERS_OF_FLOOR * floor_rad) } else { least_rad };
         let inexact = square > 0.0 && rms_rad < least_rad;
         let probability = if inexact { attribution.unknown.min(INEXACT_PROBABILITY) } else { attribution.unknown };
         let location = strongest

@@ -14,6 +14,8 @@ const UNKNOWN_ODDS: f64 = 0.15;
 const KNOWN_NATS: f64 = 1e4;
 /// Most blocks of a set.
 const LARGEST_SET: usize = 8;
+/// Largest part, in parts of the whole residual.
+const LARGEST: f64 = 3.0;
 /// How many of the best candidates are tried exactly.
 const TRIED: usize = 5;
 /// Candidates kept of a scan.
@@ -50,6 +52,8 @@ pub struct Search<'a> {
     whitened: &'a Whitened,
     /// Constant of this noise: what the evidence of the empty set lacks.
     offset: f64,
+    /// RMS from which two parts that cancel are no explanation, rad.
+    largest_rad: f64,
     priors: Vec<f64>,
     seen: HashMap<Vec<usize>, Option<Model>>,
     scanned: HashMap<(Vec<usize>, Allowed), Ranking>,
@@ -71,7 +75,8 @@ impl<'a> Search<'a> {
             })
             .collect();
         let offset = -0.5 * whitened.log_det - 0.5 * whitened.gram[(0, 0)];
-        Self { pool, whitened, offset, priors, seen: HashMap::new(), scanned: HashMap::new() }
+        let largest_rad = LARGEST * pool.residual_rms_rad();
+        Self { pool, whitened, offset, largest_rad, priors, seen: HashMap::new(), scanned: HashMap::new() }
     }
 
     fn library(&self, block: usize) -> Option<usize> {
@@ -93,7 +98,9 @@ impl<'a> Search<'a> {
                 near.and_then(|fit| fit.set.iter().position(|x| x == b).map(|n| fit.scales_rad[n])).unwrap_or(3e-5)
             })
             .collect();
-        let model = fit(self.pool, self.whitened, &set, &start).map(|fit| {
+        let fitted = fit(self.pool, self.whitened, &set, &start)
+            .filter(|fit| (0..set.len()).all(|n| fit.rms_rad(self.pool, n) < self.largest_rad));
+        let model = fitted.map(|fit| {
             let prior: f64 = set.iter().map(|b| self.priors[*b]).sum();
             Model { score: self.offset + fit.log_evidence + prior, fit }
         });
@@ -112,6 +119,7 @@ impl<'a> Search<'a> {
                 }
                 None => allowed == Allowed::All,
             })
+            .filter(|b| !set.iter().any(|s| self.pool.blocks[*s].cause.excludes(&self.pool.blocks[*b].cause)))
             .collect()
     }
 
@@ -180,7 +188,7 @@ impl<'a> Search<'a> {
         let set = &best.fit.set;
         for m in 0..set.len() {
             for n in 0..m {
-                let rest: Vec<usize> = set.iter().copied().filter(|b| *b != set[m] && *b != set[n]).collect();
+                let rest = without(set, &[set[m], set[n]]);
                 let Some(fewer) = self.model(rest.clone(), Some(&best.fit)) else { continue };
                 for (block, score) in self.additions(&fewer, allowed, TRIED) {
                     if score > best.score - 3.0
@@ -255,6 +263,10 @@ impl<'a> Search<'a> {
         models.sort_by(|a, b| b.score.total_cmp(&a.score).then_with(|| a.fit.set.cmp(&b.fit.set)));
         models
     }
+}
+
+fn without(set: &[usize], blocks: &[usize]) -> Vec<usize> {
+    set.iter().copied().filter(|b| !blocks.contains(b)).collect()
 }
 
 fn with(set: &[usize], block: usize) -> Vec<usize> {

@@ -60,6 +60,7 @@ fn plan() -> Plan {
         speeds_rad_per_s,
         senses: [true, true],
         duration_s: 600.0,
+        starts_s: Vec::new(),
         runs: 12,
         revolutions: 48.0,
         turns: [1.0, 1.0],
@@ -316,7 +317,8 @@ fn the_most_advanced_tooth_carries_as_in_exact_contact() {
             assert!(errors.iter().sum::<f64>().abs() < 1e-12, "a mean is a backlash");
             assert!(rms(errors) > 3e-4);
         }
-        let shape = tables.concat();
+        let mut shape = tables.concat();
+        shape.push(0.0);
         assert_eq!(effect.refine(&rig, &Vec::new(), &beta).unwrap(), shape);
         let exact = ContactModel::new(pair.clone(), &Errors::default()).unwrap();
         let teeth = ToothErrors { driver_pitch_mm: tables, ..ToothErrors::default() };
