@@ -52,7 +52,7 @@ impl Effect for MeshStiffnessVariation {
         shapes
     }
 
-    fn grain(&self) -> Grain {
+    fn grain(&self, _shape: &Shape) -> Grain {
         Grain::Sharp
     }
 

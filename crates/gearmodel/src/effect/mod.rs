@@ -165,7 +165,7 @@ pub trait Effect: Sync {
     }
 
     /// How fine the trace is: it is averaged over an angle bin as the samples are.
-    fn grain(&self) -> Grain {
+    fn grain(&self, _shape: &Shape) -> Grain {
         Grain::Smooth
     }
 

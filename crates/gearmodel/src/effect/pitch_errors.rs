@@ -89,7 +89,7 @@ impl Effect for PitchErrors {
         Some(refined)
     }
 
-    fn grain(&self) -> Grain {
+    fn grain(&self, _shape: &Shape) -> Grain {
         Grain::Sharp
     }
 

@@ -63,7 +63,7 @@ impl Effect for ProfileError {
         if shape[..] == [A_FLANK] { 4 * ORDERS } else { 2 * ORDERS }
     }
 
-    fn grain(&self) -> Grain {
+    fn grain(&self, _shape: &Shape) -> Grain {
         Grain::Fine
     }
 

@@ -56,7 +56,7 @@ impl Effect for ToothDamage {
         true
     }
 
-    fn grain(&self) -> Grain {
+    fn grain(&self, _shape: &Shape) -> Grain {
         Grain::Fine
     }
 

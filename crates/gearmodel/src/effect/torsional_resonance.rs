@@ -150,8 +150,9 @@ impl Effect for TorsionalResonance {
         true
     }
 
-    fn grain(&self) -> Grain {
-        Grain::Fine
+    fn grain(&self, shape: &Shape) -> Grain {
+        // Orders of the turn are smooth, those of the mesh are not.
+        if shape.first() == Some(&MESH) { Grain::Fine } else { Grain::Smooth }
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {

@@ -26,14 +26,14 @@ const RUN_RATIOS: [f64; 6] = [0.02, 0.08, 0.3, 1.0, 3.0, 10.0];
 const RUN_RATIO_SPREAD: f64 = 1.5;
 /// Evidence from which a wave that does not close with the turn is taken into the pool, nats.
 const WANDERING_NATS: f64 = 8.0;
-/// Most times that an event is fitted under the scatter that it left, and the part of the scatter's square from which it is not worth
-/// another.
-const EVENT_ROUNDS: usize = 5;
-const EVENT_QUIETER: f64 = 0.9;
+/// Most times that what runs on with time is fitted under the scatter that it left, and the part of the scatter's square from which it
+/// is not worth another. Steps are not: whatever they are fitted to would leave less and less.
+const RUNNING_ON_ROUNDS: usize = 5;
+const QUIETER: f64 = 0.9;
 /// A set with an event that alone scores so much less than the best is not searched about, nats.
 const NEAR_NATS: f64 = 30.0;
-/// The same where the best model has nothing that the event could stand in for, nats.
-const NEARER_NATS: f64 = 10.0;
+/// The same where the best model has nothing that the event could stand in for: it must be better by itself, nats.
+const NEARER_NATS: f64 = 0.0;
 /// Blocks smaller than this part of the largest are left out while its shape is moved.
 const LARGE: f64 = 0.12;
 /// Steps in which shapes are moved, in parts of their grid's.
@@ -526,7 +526,7 @@ impl<'a> Engine<'a> {
         causes.retain(|cause| self.block_of(cause).is_none());
         let changed = !causes.is_empty();
         for block in self.pool.add(&self.grid, self.rig, causes) {
-            if let Some(noise) = self.noise_with(&self.pool.blocks[block].cause) {
+            if let Some(noise) = self.noise_with(&self.pool.blocks[block].cause, 1) {
                 self.weigh_event(block, noise);
             }
         }
@@ -550,7 +550,7 @@ impl<'a> Engine<'a> {
         let swings = slow_tone::strongest(&self.grid, &self.noise, &rest);
         let mut changed = false;
         for cause in settles.into_iter().chain(swings.into_iter().chain(walk).map(Cause::Unknown)) {
-            if let Some(noise) = self.noise_with(&cause) {
+            if let Some(noise) = self.noise_with(&cause, RUNNING_ON_ROUNDS) {
                 changed = true;
                 for block in self.pool.add(&self.grid, self.rig, vec![cause]) {
                     self.weigh_event(block, noise.clone());
@@ -589,7 +589,7 @@ impl<'a> Engine<'a> {
         let Some((pattern, _)) = best else { return false };
         let added = self.pool.add(&self.grid, self.rig, vec![Cause::Unknown(pattern)]);
         for block in &added {
-            if let Some(noise) = self.noise_with(&self.pool.blocks[*block].cause) {
+            if let Some(noise) = self.noise_with(&self.pool.blocks[*block].cause, 1) {
                 self.weigh_event(*block, noise);
             }
         }
@@ -598,7 +598,7 @@ impl<'a> Engine<'a> {
 
     /// Steps and tones pass for scatter until they are taken off: the noise that one leaves beside what does not move the level,
     /// where that alone comes near the best model.
-    fn noise_with(&self, event: &Cause) -> Option<Noise> {
+    fn noise_with(&self, event: &Cause, rounds: usize) -> Option<Noise> {
         let steady = self.steady_set();
         let best = self.best.as_ref()?;
         let mut causes: Vec<Cause> = steady.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
@@ -608,14 +608,14 @@ impl<'a> Engine<'a> {
         let own = few.add(&self.grid, self.rig, causes);
         let mut noise = self.noise.clone();
         // What passes for scatter holds its own amplitudes down until the scatter is less.
-        for _ in 0..EVENT_ROUNDS {
+        for _ in 0..rounds {
             let before = noise.floor_rad2();
             let fit = evidence::fit(&few, &noise.whiten(&self.grid, &few), &own, &[])?;
             let run_ratio = noise.run_ratio;
             noise = Noise::estimate(&self.grid, &few, &fit.amplitudes());
             noise.run_ratio = run_ratio;
             noise.run_ratio = self.best_run_ratio(&noise, &few, &fit);
-            if noise.floor_rad2() > EVENT_QUIETER * before {
+            if noise.floor_rad2() > QUIETER * before {
                 break;
             }
         }

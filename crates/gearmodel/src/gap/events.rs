@@ -21,7 +21,7 @@ use std::f64::consts::TAU;
 /// What a step costs on the way through the sectors, nats: its place is open.
 const STEP_NATS: f64 = 4.0;
 /// What steps cost as an effect, nats: to look for them, and each, whose place was chosen to a fraction of a degree.
-pub(super) const STEPS_COST_NATS: [f64; 2] = [6.0, 6.5];
+pub(super) const STEPS_COST_NATS: [f64; 2] = [8.0, 6.5];
 /// Most single steps of any size looked for, and the evidence from which one is taken into the pool, nats.
 const SINGLE_STEPS: usize = 3;
 const SINGLE_STEP_NATS: f64 = 14.0;

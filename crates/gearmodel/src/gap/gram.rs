@@ -5,6 +5,8 @@ use rayon::prelude::*;
 
 /// Columns of the left factor taken together.
 const PANEL: usize = 128;
+/// Columns up to which a product is made column by column.
+const FEW: usize = 4;
 /// Products of fewer columns than this are not worth being shared out.
 const SMALL: usize = 32;
 
@@ -47,7 +49,35 @@ pub(super) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// AᵀWA with the weights of A's rows.
 pub(super) fn weighted(a: &DMatrix<f64>, weight: &[f64]) -> DMatrix<f64> {
-    symmetric(a, Some(weight))
+    if a.ncols() > FEW {
+        return symmetric(a, Some(weight));
+    }
+    let columns: Vec<_> = a.column_iter().map(|column| column.into_owned()).collect();
+    let sum = |m: usize, n: usize| {
+        columns[m].iter().zip(columns[n].iter()).zip(weight).map(|((x, y), w)| w * x * y).sum::<f64>()
+    };
+    let mut product = DMatrix::zeros(a.ncols(), a.ncols());
+    for m in 0..a.ncols() {
+        for n in 0..=m {
+            product[(m, n)] = sum(m, n);
+            product[(n, m)] = product[(m, n)];
+        }
+    }
+    product
+}
+
+/// AT of a small T.
+pub(super) fn times(a: &DMatrix<f64>, t: &DMatrix<f64>) -> DMatrix<f64> {
+    if a.ncols() > FEW {
+        return a * t;
+    }
+    let mut product = DMatrix::zeros(a.nrows(), t.ncols());
+    for (mut column, t) in product.column_iter_mut().zip(t.column_iter()) {
+        for (x, factor) in a.column_iter().zip(t.iter()) {
+            column.axpy(*factor, &x, 1.0);
+        }
+    }
+    product
 }
 
 fn symmetric(a: &DMatrix<f64>, weight: Option<&[f64]>) -> DMatrix<f64> {

@@ -118,6 +118,50 @@ impl Base {
     }
 }
 
+/// Rows of a cause at stations.
+fn rows(cause: &Cause, rig: &Rig, stations: &[Station], width: usize) -> DMatrix<f64> {
+    let mut raw = DMatrix::zeros(stations.len(), width);
+    let (mut row, mut part) = (vec![0.0; width], vec![0.0; width]);
+    let grain = match cause {
+        Cause::Effect { effect, shape, .. } => effect.grain(shape),
+        Cause::Unknown(_) => Grain::Smooth,
+    };
+    let places = grain.places();
+    let take = |station: &Station, row: &mut [f64]| match cause {
+        Cause::Effect { effect, shape, .. } => effect.row(rig, shape, station, row),
+        Cause::Unknown(pattern) => pattern.row(station, row),
+    };
+    for (number, station) in stations.iter().enumerate() {
+        row.fill(0.0);
+        if grain == Grain::Smooth {
+            take(station, &mut row);
+        } else {
+            let mut near = *station;
+            for place in places {
+                near.move_from(station, place * station.spread_rad);
+                part.fill(0.0);
+                take(&near, &mut part);
+                row.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x / places.len() as f64);
+            }
+        }
+        for (column, value) in row.iter().enumerate() {
+            raw[(number, column)] = *value;
+        }
+    }
+    raw
+}
+
+/// Cells' rows at every place, grown with time.
+fn grown(grid: &Grid, of_cells: &DMatrix<f64>, mean_s: f64) -> DMatrix<f64> {
+    let mut raw = DMatrix::zeros(grid.places.len(), of_cells.ncols());
+    for (mut column, cells) in raw.column_iter_mut().zip(of_cells.column_iter()) {
+        for ((value, cell), at) in column.iter_mut().zip(&grid.cell_of).zip(&grid.places) {
+            *value = cells[*cell] * at.time_s / mean_s;
+        }
+    }
+    raw
+}
+
 fn values(unit: &DMatrix<f64>, evolves: bool, transform: DMatrix<f64>) -> (Vec<Values>, DMatrix<f64>) {
     let column = |column: Vec<f64>| if evolves { Values::Places(column) } else { Values::Cells(column) };
     (unit.column_iter().map(|x| column(x.iter().copied().collect())).collect(), transform)
@@ -220,34 +264,13 @@ impl Pool {
         };
         let (stations, weights) =
             if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.base.cell_weight) };
-        let mut raw = DMatrix::zeros(stations.len(), width);
-        let (mut row, mut part) = (vec![0.0; width], vec![0.0; width]);
-        let grain = match cause {
-            Cause::Effect { effect, .. } => effect.grain(),
-            Cause::Unknown(_) => Grain::Smooth,
+        let raw = match cause {
+            Cause::Unknown(pattern) => match pattern.growing() {
+                Some((steady, mean_s)) => grown(grid, &rows(&Cause::Unknown(steady), rig, &grid.cells, width), mean_s),
+                None => rows(cause, rig, stations, width),
+            },
+            Cause::Effect { .. } => rows(cause, rig, stations, width),
         };
-        let places = grain.places();
-        let take = |station: &Station, row: &mut [f64]| match cause {
-            Cause::Effect { effect, shape, .. } => effect.row(rig, shape, station, row),
-            Cause::Unknown(pattern) => pattern.row(station, row),
-        };
-        for (number, station) in stations.iter().enumerate() {
-            row.fill(0.0);
-            if grain == Grain::Smooth {
-                take(station, &mut row);
-            } else {
-                let mut near = *station;
-                for place in places {
-                    near.move_from(station, place * station.spread_rad);
-                    part.fill(0.0);
-                    take(&near, &mut part);
-                    row.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x / places.len() as f64);
-                }
-            }
-            for (column, value) in row.iter().enumerate() {
-                raw[(number, column)] = *value;
-            }
-        }
         let total: f64 = weights.iter().sum();
         // A constant is the zero's; what is left of a column is its trace.
         let means = raw.tr_mul(&DVector::from_column_slice(weights)) / total;
@@ -277,7 +300,7 @@ impl Pool {
             }
             transform.set_column(to, &direction);
         }
-        Some(values(&(raw * &transform), evolves, transform))
+        Some(values(&gram::times(&raw, &transform), evolves, transform))
     }
 
     /// Adds columns with their sums.

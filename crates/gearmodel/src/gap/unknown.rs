@@ -303,6 +303,18 @@ impl Pattern {
         }
     }
 
+    /// What grows evenly with time: the pattern that does, and the time over which it grows by its size, s.
+    #[must_use]
+    pub fn growing(&self) -> Option<(Self, f64)> {
+        match self {
+            Self::Order { shaft, order, odd, weight: Weight::Time, mean } if order.fract() == 0.0 => {
+                let steady = Self::Order { shaft: *shaft, order: *order, odd: *odd, weight: Weight::One, mean: 1.0 };
+                Some((steady, *mean))
+            }
+            _ => None,
+        }
+    }
+
     /// Values at a station.
     pub fn row(&self, at: &Station, row: &mut [f64]) {
         let scale = |weight: Weight, mean: f64, odd: bool| {
