@@ -28,6 +28,8 @@ const MOST_TERMS: usize = 48;
 /// What a level that runs on with time costs, nats: scatter does too, a little.
 const RUNNING_ON_COST_NATS: f64 = 6.0;
 
+/// What a step costs whose time was chosen, nats.
+const STEP_COST_NATS: f64 = 6.0;
 /// What an order that was chosen from all high ones costs, nats.
 const GHOST_COST_NATS: f64 = 4.0;
 /// The same of each further one that goes with it, nats.
@@ -267,6 +269,7 @@ impl Pattern {
             Self::Order { order, .. } if order.fract() != 0.0 => WANDERING_COST_NATS,
             Self::Settling { .. } | Self::RandomWalk { .. } | Self::Tone { .. } => RUNNING_ON_COST_NATS,
             Self::Order { order, .. } if *order > HIGHEST_ORDER as f64 => GHOST_COST_NATS,
+            Self::Step { .. } => STEP_COST_NATS,
             Self::Comb { orders, .. } => GHOST_COST_NATS + ANOTHER_GHOST_COST_NATS * (orders.len() as f64 - 1.0),
             _ => 0.0,
         }
