@@ -136,6 +136,50 @@ def test_summary_reads_as_the_contract_says(found):
     assert not any(len(word.strip("(),.e-+").replace(".", "")) > 8 for word in repr(found).split() if word[:1].isdigit())
 
 
+def _settling(s):
+    """A mount that gives a little anew in each run."""
+    return 60e-6 * s.sign * np.exp(-(s.time_s - s.time_s[0]) / 6.0)
+
+
+def _random_walk(s):
+    """A level that wanders over the whole campaign, the same in all of its runs."""
+    clock = np.linspace(0, 400, 4000)
+    walk = np.cumsum(np.random.default_rng(5).standard_normal(4000))
+    return 50e-6 * np.interp(s.time_s, clock, walk - walk.mean()) / walk.std()
+
+
+def _slow_swing(s):
+    """An air conditioner's period: slower than a turn, tied to no angle."""
+    return 50e-6 * np.sin(2 * np.pi * s.time_s / 17.3)
+
+
+def _ghost_order(s):
+    """What a grinding wheel leaves: orders 60 and 120 of the driven gear's turn."""
+    return 20e-6 * np.sin(60 * s.theta2 + 0.4) + 8e-6 * np.sin(120 * s.theta2)
+
+
+OUTSIDE = [
+    (_settling, "settles anew"),
+    (_random_walk, "wanders with time"),
+    (_slow_swing, "a tone of 0.0578 Hz"),
+    (_ghost_order, "orders 60, 120 of the driven shaft"),
+]
+
+
+@pytest.mark.parametrize(("outside", "said"), OUTSIDE, ids=[outside.__name__ for outside, _ in OUTSIDE])
+def test_what_no_effect_makes_is_called_unknown_and_described(outside, said):
+    alone = c.made(c.recordings([outside]))
+    d = gm.diagnose(alone, c.pair())
+    assert d.verdict == ["unknown"], str(d)
+    assert said in d.unknown["where"]["description"], str(d)
+
+    beside = c.made(c.recordings([outside, c.output_encoder(40e-6, 0.6)]))
+    d = gm.diagnose(beside, c.pair())
+    named = [v if isinstance(v, str) else v["members"] for v in d.verdict]
+    assert "unknown" in named and len(named) == 2, str(d)
+    assert any("encoder2_eccentricity" in v for v in named), str(d)
+
+
 def test_the_order_of_recordings_does_not_matter(found):
     again = gm.diagnose(c.made(c.recordings(EFFECTS)[::-1]), c.pair())
     assert c.names(again.verdict) == c.names(found.verdict)

@@ -17,6 +17,8 @@ const NEIGHBOURS: usize = 8;
 const OUTSTANDING: f64 = 4.0;
 /// Least evidence of a line against white noise, nats.
 const LEAST_NATS: f64 = 12.0;
+/// Part of the strongest line's amplitude under which another that is no harmonic of it may be its foot.
+const LEAKS: f64 = 0.15;
 /// Most lines a shaft.
 const MOST: usize = 10;
 /// Bins of a turn, over which the residual is transformed.
@@ -39,7 +41,11 @@ pub fn find(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Pattern> {
         let mut orders: Vec<usize> = Vec::new();
         let mut sizes: Vec<f64> = Vec::new();
         for (order, nats) in lines {
-            if !orders.contains(&order) && orders.len() < MOST {
+            // The samples are not spread evenly over the turn: a strong line leaks into others.
+            let leaks = orders.first().zip(sizes.first()).is_some_and(|(strongest, size): (&usize, &f64)| {
+                !order.is_multiple_of(*strongest) && nats.sqrt() < LEAKS * size
+            });
+            if !leaks && !orders.contains(&order) && orders.len() < MOST {
                 orders.push(order);
                 sizes.push(nats.sqrt());
             }

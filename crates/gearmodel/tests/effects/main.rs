@@ -340,6 +340,23 @@ fn the_most_advanced_tooth_carries_as_in_exact_contact() {
 }
 
 #[test]
+fn longer_tips_keep_two_pairs_in_contact_for_longer_up_to_a_racks() {
+    for pair in [elliptic(0.3287), circular((23, 47))] {
+        let rig = rig(&pair);
+        let mean_pairs = |reach: f64| {
+            let at: Vec<Station> = places(900).into_iter().map(|(theta, way)| station(&rig, theta, way)).collect();
+            at.iter().map(|at| rig.teeth_in_contact(at, reach).count()).sum::<usize>() as f64 / at.len() as f64
+        };
+        let ratios = [-0.5, 0.0, 0.5, 1.0].map(mean_pairs);
+        assert!(ratios.windows(2).all(|pair| pair[0] < pair[1]), "{ratios:?}");
+        // ε = 2 h_a/(π cos α sin α) of two racks: no gears have more.
+        let (sin, cos) = pair.pressure_angle_rad().sin_cos();
+        let of_racks = 2.0 * pair.addendum() / (std::f64::consts::PI * sin * cos);
+        assert!((ratios[3] - of_racks).abs() < 0.02, "{} {of_racks}", ratios[3]);
+    }
+}
+
+#[test]
 fn a_profile_is_that_of_exact_contact_on_either_flank() {
     let (amplitude_mm, phi) = (2e-5, 0.7_f64);
     for pair in [elliptic(0.3287), circular((23, 47))] {
