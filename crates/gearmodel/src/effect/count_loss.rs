@@ -33,6 +33,10 @@ impl Effect for CountLoss {
         "acquisition"
     }
 
+    fn steps(&self) -> bool {
+        true
+    }
+
     fn signature(&self) -> Signature {
         Signature::steady(Carrier::None, Parity::Even).accumulating(Accumulates::PerRevolution)
     }

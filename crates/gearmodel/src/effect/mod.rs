@@ -164,6 +164,11 @@ pub trait Effect: Sync {
         false
     }
 
+    /// True where a shape is a list of times at which the level steps.
+    fn steps(&self) -> bool {
+        false
+    }
+
     /// How fine the trace is: it is averaged over an angle bin as the samples are.
     fn grain(&self, _shape: &Shape) -> Grain {
         Grain::Smooth

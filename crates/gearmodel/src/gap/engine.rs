@@ -10,13 +10,13 @@ use super::knocks::Knocks;
 use super::line_phase::{LineError, LinePhase};
 use super::noise::{FIRST_RUN_RATIO, Noise, Whitened};
 use super::nominal::Nominal;
-use super::pool::{Cause, Pool, STEPS};
+use super::pool::{Cause, Pool};
 use super::predict::{Found, FoundEffect};
 use super::reduce::{ReducedRun, Reducer, Sample};
 use super::search::{Allowed, Model, Search};
 use super::unknown::Pattern;
 use super::{events, evidence, ghosts, interpolation, knocks, locate, next, shrink, slow_tone};
-use crate::effect::{Accumulates, Estimate, INTERPOLATION, LIBRARY, Rig, by_name};
+use crate::effect::{Accumulates, Effect, Estimate, INTERPOLATION, LIBRARY, Rig, by_name};
 use crate::recording::Recording;
 use crate::{Direction, NominalModel};
 
@@ -514,9 +514,8 @@ impl<'a> Engine<'a> {
         let found = events::find(&self.grid, &self.pool, &self.noise, &amplitudes, &steady);
         let mut causes = Vec::new();
         causes.extend(found.patterns.into_iter().map(Cause::Unknown));
-        let allowed = !self.options.exclude.iter().any(|name| name == STEPS);
-        let count_loss = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.name() == STEPS);
-        if let Some((number, effect)) = count_loss.filter(|_| allowed) {
+        let excluded = |effect: &dyn Effect| self.options.exclude.iter().any(|name| name == effect.name());
+        if let Some((number, effect)) = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.steps() && !excluded(*e)) {
             causes.extend(found.steps.into_iter().map(|times_s| {
                 let [any, each] = events::STEPS_COST_NATS;
                 let cost_nats = any + each * times_s.len() as f64;

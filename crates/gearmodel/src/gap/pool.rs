@@ -16,9 +16,6 @@ use super::noise::WAVES;
 use super::unknown::Pattern;
 use crate::effect::{Effect, Grain, Rig, Shape, Station};
 
-/// The effect whose shapes are times of steps.
-pub(super) const STEPS: &str = "count_loss";
-
 /// What a block of columns stands for.
 #[derive(Clone)]
 pub enum Cause {
@@ -43,7 +40,7 @@ impl Cause {
     pub fn excludes(&self, other: &Self) -> bool {
         let walks = |cause: &Self| matches!(cause, Self::Unknown(Pattern::RandomWalk { .. }));
         let steps = |cause: &Self| match cause {
-            Self::Effect { effect, .. } => effect.name() == STEPS,
+            Self::Effect { effect, .. } => effect.steps(),
             Self::Unknown(pattern) => matches!(pattern, Pattern::Step { .. }),
         };
         walks(self) && steps(other) || steps(self) && walks(other)
