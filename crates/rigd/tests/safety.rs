@@ -11,6 +11,7 @@ use nix::sys::signal::Signal;
 use rigd::profile::Profile;
 use riglog::proto::Phase;
 use riglog::{LogReader, Record};
+use support::bench::events;
 use support::line::{Cable, Fault};
 use support::{Run, Sim, rigd};
 
@@ -112,6 +113,34 @@ fn the_emergency_stop() {
     std::thread::sleep(Duration::from_millis(200));
     let next = Run::with_profile(&profile, &["--revs", "1", "--direction", "ccw"]).wait(60.0);
     assert_eq!(next.code, Some(0), "{}", next.stderr);
+}
+
+#[test]
+fn a_load_that_runs_over_its_limit_while_the_shaft_turns() {
+    let mut sim = Sim::start(7);
+    // Supervised at 11 N·m, a tenth over what set-points are refused by.
+    let profile = sim.profile(|profile| profile.limits.load_nm = 10.0);
+    let mut run = recording(&sim, &profile);
+    // 0.482 A make 10 N·m; 4 % more are 10.6 N·m.
+    sim.tell("overcurrent 1.04");
+    std::thread::sleep(Duration::from_secs(2));
+    assert!(!run.process.ended(), "under the limit it goes on");
+    sim.tell("overcurrent 1.3");
+    let ended = run.wait(20.0);
+    assert_eq!(ended.code, Some(5), "{}", ended.stderr);
+    assert!(ended.stderr.contains("load") && ended.stderr.contains("limits.load_nm, and a tenth"), "{}", ended.stderr);
+    let said = events(&run.log().expect("a log"));
+    assert!(said.iter().any(|(_, name, text)| name == "halt" && text.contains("limits.load_nm")), "{said:?}");
+    run.assert_whole();
+    // The order of the stop: the load stays on the shaft until it stands, then brake to 0, then servo off.
+    std::thread::sleep(Duration::from_millis(300));
+    let shafts = sim.shafts();
+    let last_turning = shafts.iter().rposition(|shaft| shaft.turns()).expect("it turned");
+    let brake_off = shafts.iter().rposition(|shaft| shaft.brake_a > 0.05).expect("it was loaded");
+    let servo_off = shafts.iter().rposition(|shaft| shaft.servo_on).expect("it was on");
+    let at = |index: usize| shafts[index].unix_s - shafts[last_turning].unix_s;
+    println!("over its load: brake off {:.2} s, servo off {:.2} s after standstill", at(brake_off), at(servo_off));
+    assert!(last_turning < brake_off && brake_off < servo_off && servo_off + 1 < shafts.len());
 }
 
 #[test]

@@ -4,6 +4,7 @@ use async_trait::async_trait;
 
 use super::bus::BusStatistics;
 use super::map::{BrakeRules, Map, Mapped};
+use super::unmapped::Unmapped;
 use super::{Brake, BrakeStatus, DeviceError, Identity};
 use crate::link::{Address, Link};
 use crate::profile::BrakeProfile;
@@ -23,7 +24,7 @@ pub fn open(link: Link, address: Address, profile: &BrakeProfile) -> Box<dyn Bra
             let model = map.models.first().cloned();
             Box::new(MappedBrake { device: Mapped { bus, map, model }, rules })
         }
-        Err(reason) => Box::new(Unmapped { reason }),
+        Err(reason) => Box::new(Unmapped { device: "brake", reason }),
     }
 }
 
@@ -100,41 +101,5 @@ impl Brake for MappedBrake {
 
     fn statistics(&self) -> BusStatistics {
         self.device.bus.statistics()
-    }
-}
-
-/// A source whose map could not be read: says so to whatever is asked of it.
-struct Unmapped {
-    reason: String,
-}
-
-impl Unmapped {
-    fn refuse<T>(&self) -> Result<T, DeviceError> {
-        Err(DeviceError::Map { device: "brake", reason: self.reason.clone() })
-    }
-}
-
-#[async_trait(?Send)]
-impl Brake for Unmapped {
-    async fn identify(&mut self) -> Result<Identity, DeviceError> {
-        self.refuse()
-    }
-    fn max_current_a(&self) -> f64 {
-        0.0
-    }
-    async fn prepare(&mut self, _: f64) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn set_current_a(&mut self, _: f64) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn release(&mut self) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn status(&mut self) -> Result<BrakeStatus, DeviceError> {
-        self.refuse()
-    }
-    fn statistics(&self) -> BusStatistics {
-        BusStatistics::default()
     }
 }

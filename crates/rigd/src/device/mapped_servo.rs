@@ -6,6 +6,7 @@ use async_trait::async_trait;
 
 use super::bus::{BusError, BusStatistics};
 use super::map::{Map, Mapped, ServoRules, Step};
+use super::unmapped::Unmapped;
 use super::{DeviceError, Identity, Servo, ServoStatus};
 use crate::link::{Address, Link};
 use crate::profile::ServoProfile;
@@ -27,7 +28,7 @@ pub fn open(link: Link, address: Address, profile: &ServoProfile) -> Box<dyn Ser
             let bus = map.bus(link, address, profile.unit);
             Box::new(MappedServo { name: map.title.clone(), device: Mapped { bus, map, model: None }, rules })
         }
-        Err(reason) => Box::new(Unmapped { reason }),
+        Err(reason) => Box::new(Unmapped { device: "servo", reason }),
     }
 }
 
@@ -196,42 +197,6 @@ impl Servo for MappedServo {
 
     fn statistics(&self) -> BusStatistics {
         self.device.bus.statistics()
-    }
-}
-
-/// A servo whose map could not be read: says so to whatever is asked of it.
-struct Unmapped {
-    reason: String,
-}
-
-impl Unmapped {
-    fn refuse<T>(&self) -> Result<T, DeviceError> {
-        Err(DeviceError::Map { device: "servo", reason: self.reason.clone() })
-    }
-}
-
-#[async_trait(?Send)]
-impl Servo for Unmapped {
-    async fn identify(&mut self) -> Result<Identity, DeviceError> {
-        self.refuse()
-    }
-    async fn prepare(&mut self, _: f64, _: f64, _: Duration) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn max_motor_rpm(&mut self) -> Result<f64, DeviceError> {
-        self.refuse()
-    }
-    async fn set_enabled(&mut self, _: bool) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn set_motor_rpm(&mut self, _: f64) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn status(&mut self) -> Result<ServoStatus, DeviceError> {
-        self.refuse()
-    }
-    fn statistics(&self) -> BusStatistics {
-        BusStatistics::default()
     }
 }
 

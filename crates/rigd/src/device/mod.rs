@@ -9,6 +9,7 @@ pub mod mapped_brake;
 pub mod mapped_servo;
 pub mod refused;
 pub mod two_clocks;
+pub mod unmapped;
 
 use std::time::Duration;
 
