@@ -135,7 +135,8 @@ fn a_load_that_runs_over_its_limit_while_the_shaft_turns() {
     // The order of the stop: the load stays on the shaft until it stands, then brake to 0, then servo off.
     std::thread::sleep(Duration::from_millis(300));
     let shafts = sim.shafts();
-    let last_turning = shafts.iter().rposition(|shaft| shaft.turns()).expect("it turned");
+    // Shafts that are wound up by the load spring back when it is let go: less than a thirtieth of the speed.
+    let last_turning = shafts.iter().rposition(|shaft| shaft.input_rpm.abs() > 1.0).expect("it turned");
     let brake_off = shafts.iter().rposition(|shaft| shaft.brake_a > 0.05).expect("it was loaded");
     let servo_off = shafts.iter().rposition(|shaft| shaft.servo_on).expect("it was on");
     let at = |index: usize| shafts[index].unix_s - shafts[last_turning].unix_s;

@@ -19,7 +19,7 @@ struct MappedBrake {
 pub fn open(link: Link, address: Address, profile: &BrakeProfile) -> Box<dyn Brake> {
     match Map::of_brake(profile) {
         Ok((map, rules)) => {
-            let bus = map.bus(link, address, profile.unit);
+            let bus = map.bus(link, address, profile.unit, profile.horizon());
             // The first model, whose currents are the smallest, until the device has said which it is.
             let model = map.models.first().cloned();
             Box::new(MappedBrake { device: Mapped { bus, map, model }, rules })

@@ -25,7 +25,7 @@ struct MappedServo {
 pub fn open(link: Link, address: Address, profile: &ServoProfile) -> Box<dyn Servo> {
     match Map::of_servo(profile) {
         Ok((map, rules)) => {
-            let bus = map.bus(link, address, profile.unit);
+            let bus = map.bus(link, address, profile.unit, profile.horizon());
             Box::new(MappedServo { name: map.title.clone(), device: Mapped { bus, map, model: None }, rules })
         }
         Err(reason) => Box::new(Unmapped { device: "servo", reason }),
@@ -261,10 +261,14 @@ mod tests {
 
     /// Works with a driver of the map on such a drive.
     async fn with<T>(map: &str, drive: Keeping, work: impl AsyncFnOnce(&mut dyn Servo) -> T) -> T {
-        let (near, far) = tokio::io::duplex(1024);
         let profile = ServoProfile { driver: map.into(), unit: 1, ..Profile::simulated().servo };
+        with_profile(&profile, drive, work).await
+    }
+
+    async fn with_profile<T>(profile: &ServoProfile, drive: Keeping, work: impl AsyncFnOnce(&mut dyn Servo) -> T) -> T {
+        let (near, far) = tokio::io::duplex(1024);
         let address = Address { device: "servo", port: "x".into(), baud: 38_400, format: "8N2".into() };
-        let mut servo = open(Box::new(near), address, &profile);
+        let mut servo = open(Box::new(near), address, profile);
         let served = serve(far, drive);
         tokio::select! {
             () = served => panic!("the line is open"),
@@ -308,6 +312,21 @@ mod tests {
         let drive = Keeping { refused: Some(wire::asda_b2::WATCHDOG.address), ..Keeping::default() };
         let off = with("asda-b2", drive, async |servo| servo.set_enabled(false).await).await;
         assert!(off.is_ok(), "{off:?}");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_line_is_heard_for_as_long_as_the_profile_says_that_answers_are_late() {
+        let mut took = Vec::new();
+        for late_ms in [400.0, 900.0] {
+            let profile = ServoProfile { late_ms, ..Profile::simulated().servo };
+            let begun = tokio::time::Instant::now();
+            with_profile(&profile, Keeping::default(), async |servo| servo.max_motor_rpm().await.map(drop))
+                .await
+                .expect("it answers");
+            took.push(begun.elapsed().as_millis());
+        }
+        // A line just opened is heard for a whole horizon before the first request.
+        assert!((480..=520).contains(&(took[1] - took[0])), "{took:?} ms");
     }
 
     #[tokio::test(start_paused = true)]

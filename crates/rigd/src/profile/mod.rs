@@ -10,6 +10,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::calibration::{Calibration, CalibrationFileError};
+use crate::device::bus::Horizon;
+use lines::Fault;
 
 /// The embedded profile: emulated hardware in this process.
 pub const SIM_PROFILE: &str = include_str!("sim.toml");
@@ -71,6 +73,20 @@ pub struct ServoProfile {
     pub accel_ms: f64,
     /// Ramp from 3000 rpm of the motor to 0, ms.
     pub decel_ms: f64,
+    /// A late answer of its line may come until so long after its request, ms; more where a gateway holds answers back.
+    #[serde(default = "late_ms")]
+    pub late_ms: f64,
+    /// An answer may come once more until so long after it was taken, ms.
+    #[serde(default = "repeated_ms")]
+    pub repeated_ms: f64,
+}
+
+impl ServoProfile {
+    /// How long answers may come after they were due.
+    #[must_use]
+    pub fn horizon(&self) -> Horizon {
+        horizon(self.late_ms, self.repeated_ms)
+    }
 }
 
 /// The brake, its driver and its calibration.
@@ -100,6 +116,25 @@ pub struct BrakeProfile {
     pub rising: Vec<[f64; 2]>,
     /// Falling branch, likewise.
     pub falling: Vec<[f64; 2]>,
+    /// A late answer of its line may come until so long after its request, ms; more where a gateway holds answers back.
+    #[serde(default = "late_ms")]
+    pub late_ms: f64,
+    /// An answer may come once more until so long after it was taken, ms.
+    #[serde(default = "repeated_ms")]
+    pub repeated_ms: f64,
+}
+
+fn late_ms() -> f64 {
+    Horizon::default().late.as_secs_f64() * 1e3
+}
+
+fn repeated_ms() -> f64 {
+    Horizon::default().repeated.as_secs_f64() * 1e3
+}
+
+fn horizon(late_ms: f64, repeated_ms: f64) -> Horizon {
+    let time = |ms: f64| Duration::try_from_secs_f64(ms * 1e-3).unwrap_or_default();
+    Horizon { late: time(late_ms), repeated: time(repeated_ms) }
 }
 
 /// The counter box.
@@ -229,6 +264,14 @@ pub enum ProfileError {
         /// Line, key and reason.
         source: Box<toml::de::Error>,
     },
+    /// All that is wrong with it, as `rigd profile check` tells it.
+    #[error("profile {path}: {}", listed(.faults))]
+    Faults {
+        /// The file.
+        path: PathBuf,
+        /// Each with its line.
+        faults: Vec<Fault>,
+    },
     /// Its calibration.
     #[error(transparent)]
     Calibration(#[from] CalibrationFileError),
@@ -246,6 +289,11 @@ pub enum ProfileError {
     },
 }
 
+fn listed(faults: &[Fault]) -> String {
+    let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    lines.join("\n  ")
+}
+
 impl Profile {
     /// The embedded profile of the simulated rig.
     ///
@@ -257,12 +305,16 @@ impl Profile {
         Self::parse(SIM_PROFILE, Path::new("(embedded)")).expect("the embedded profile is valid")
     }
 
-    /// Reads and checks a profile.
+    /// Reads and checks a profile and what it names.
     ///
     /// # Errors
-    /// [`ProfileError`] names file, line, key, value and what is accepted.
+    /// [`ProfileError`] names the file and every fault in it with line, key, value and what is accepted.
     pub fn load(path: &Path) -> Result<Self, ProfileError> {
         let text = std::fs::read_to_string(path).map_err(|source| ProfileError::Read { path: path.into(), source })?;
+        let faults = check::faults(&text, path);
+        if !faults.is_empty() {
+            return Err(ProfileError::Faults { path: path.into(), faults });
+        }
         let mut profile = Self::parse(&text, path)?;
         if let Some(calibration) = profile.calibration.clone() {
             profile.calibrate(&path.parent().unwrap_or(Path::new("")).join(calibration))?;
@@ -338,6 +390,17 @@ impl Profile {
         if !(10..=1000).contains(&self.log.sync_ms) {
             return refuse("log.sync_ms", self.log.sync_ms.to_string(), "from 10 to 1000 ms".into());
         }
+        for (keys, late_ms, repeated_ms) in [
+            (["servo.late_ms", "servo.repeated_ms"], self.servo.late_ms, self.servo.repeated_ms),
+            (["brake.late_ms", "brake.repeated_ms"], self.brake.late_ms, self.brake.repeated_ms),
+        ] {
+            if !(10.0..=5000.0).contains(&late_ms) {
+                return refuse(keys[0], late_ms.to_string(), "from 10 to 5000 ms".into());
+            }
+            if !(0.0..=late_ms).contains(&repeated_ms) {
+                return refuse(keys[1], repeated_ms.to_string(), format!("from 0 to late_ms = {late_ms}"));
+            }
+        }
         for (key, value) in [
             ("counter.input_mounted_deg", self.counter.input_mounted_deg),
             ("counter.output_mounted_deg", self.counter.output_mounted_deg),
@@ -405,6 +468,12 @@ impl Profile {
 }
 
 impl BrakeProfile {
+    /// How long answers may come after they were due.
+    #[must_use]
+    pub fn horizon(&self) -> Horizon {
+        horizon(self.late_ms, self.repeated_ms)
+    }
+
     /// Coil current that loads the driven gear with `load_nm`, by the rising branch; `None` beyond its end.
     ///
     /// The brake turns `step_up` times as fast as the driven gear, so its torque is the load divided by it.
