@@ -6,7 +6,7 @@ use gearmodel::Direction;
 use serde::{Deserialize, Serialize};
 
 use super::CampaignError;
-use crate::profile::Profile;
+use crate::profile::{Profile, SLOWEST_RPM};
 use crate::run::attend::Suspend;
 use crate::run::job::{Kind, RunSpec, Settle};
 use crate::run::limits::slip_power_w;
@@ -350,10 +350,10 @@ impl Single {
 fn check_run(name: &str, run: &RunSpec, profile: &Profile, faults: &mut Vec<String>) {
     let (limits, rig) = (&profile.limits, &profile.name);
     let (load, speed) = (run.load_nm, run.speed_rpm);
-    if !(speed > 0.0 && speed <= limits.speed_rpm) {
+    if !(speed >= SLOWEST_RPM && speed <= limits.speed_rpm) {
         let limit = limits.speed_rpm;
         faults.push(format!(
-            "{name}: speed_rpm = {speed} must be over 0 and up to {limit} rpm (limits.speed_rpm in profile '{rig}')"
+            "{name}: speed_rpm = {speed} must be from {SLOWEST_RPM} to {limit} rpm (limits.speed_rpm in profile '{rig}')"
         ));
     }
     if !(load >= 0.0 && load <= limits.load_nm) {
@@ -441,6 +441,15 @@ mod tests {
         assert!(
             faults("[[runs]]\ndirection=\"cw\"\nload_nm=nan\nspeed_rpm=1\nrevolutions=1").contains("load_nm = NaN")
         );
+    }
+
+    #[test]
+    fn a_speed_at_which_no_revolution_ends_is_refused() {
+        let at = |rpm: f64| format!("[[runs]]\ndirection=\"cw\"\nload_nm=1.0\nspeed_rpm={rpm}\nrevolutions=1");
+        let plan = CampaignPlan::parse(&at(0.01), Path::new("x")).expect("a plan");
+        plan.check(&Profile::simulated(), Path::new("x")).expect("slow");
+        assert!(faults(&at(0.0099)).contains("from 0.01 to 60 rpm"));
+        assert!(faults(&at(1e-300)).contains("from 0.01"), "of which no time can be computed");
     }
 
     #[test]

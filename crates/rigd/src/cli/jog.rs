@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::set_up::{self, Common, Refusal, Task};
 use super::{Exit, fail};
+use crate::profile::SLOWEST_RPM;
 use crate::quantity::SPEED;
 use crate::run::rig::Rig;
 use crate::run::session;
@@ -65,6 +66,9 @@ pub fn main(args: &Args) -> Exit {
             let refusal = Refusal::OverLimit { what: "--rpm", value: args.rpm, limit, unit: "rpm", key, advice };
             return fail(Exit::BadInput, &refusal);
         }
+    }
+    if args.rpm < SLOWEST_RPM {
+        return fail(Exit::BadInput, &Refusal::TooSlow { speed_rpm: args.rpm });
     }
     let direction = if args.direction == Sense::Ccw { Direction::Ccw } else { Direction::Cw };
     let plan = Jog {

@@ -9,7 +9,7 @@ use super::on_rig::{OnRig, on_rig};
 use super::run::seconds;
 use super::{Exit, fail, print, stop};
 use crate::pair;
-use crate::profile::Profile;
+use crate::profile::{Profile, SLOWEST_RPM};
 use crate::run::halt::Halt;
 use crate::run::rig::Rig;
 use crate::run::session::{self, LogHead, Outcome};
@@ -47,6 +47,12 @@ pub enum Refusal {
     /// The shaft turns only with consent.
     #[error("the shaft turns only with consent: clear the rig, keep hands off it, and say --turn")]
     NoConsent,
+    /// Nothing would be seen to turn.
+    #[error("--rpm {speed_rpm} is too slow; use {SLOWEST_RPM} rpm or more")]
+    TooSlow {
+        /// What was asked for, rpm.
+        speed_rpm: f64,
+    },
     /// A value over its limit.
     #[error("{what} {value} {unit} is over the limit {limit} {unit} ({key}); lower it{advice}")]
     OverLimit {

@@ -210,6 +210,7 @@ mod tests {
     use wire::modbus::{ExceptionCode, Request, Response};
 
     use super::*;
+    use crate::device::bus::Horizon;
     use crate::profile::Profile;
     use crate::sim::emulator::Reply;
     use crate::sim::trial::{Device, Servo as EmulatedDrive, Workload, serve};
@@ -343,7 +344,7 @@ mod tests {
         let (map, rules) = Map::of_servo(&Profile::simulated().servo).expect("built in");
         let (link, _far) = tokio::io::duplex(16);
         let address = Address { device: "servo", port: "x".into(), baud: 38_400, format: "8N2".into() };
-        let device = Mapped { bus: map.bus(Box::new(link), address, 1), map, model: None };
+        let device = Mapped { bus: map.bus(Box::new(link), address, 1, Horizon::default()), map, model: None };
         let servo = MappedServo { device, rules, name: String::new() };
         assert!(servo.is_emergency_stop(ALARM_EMERGENCY_STOP) && !servo.is_emergency_stop(ALARM_COMMUNICATION_TIMEOUT));
     }

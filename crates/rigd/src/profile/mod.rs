@@ -19,6 +19,9 @@ pub const SIM_PROFILE: &str = include_str!("sim.toml");
 /// The embedded gear pair: the source document's, with its documented errors.
 pub const DEFAULT_PAIR: &str = include_str!("pair.toml");
 
+/// Slower than this nothing is turned, rpm of the driver: a revolution would take hours.
+pub const SLOWEST_RPM: f64 = 0.01;
+
 /// A rig's profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -348,28 +351,28 @@ impl Profile {
         let refuse = |key: &'static str, value: String, expected: String| {
             Err(ProfileError::Value { path: path.into(), key, value, expected })
         };
-        let positive = [
-            ("servo.reduction", self.servo.reduction),
-            ("servo.accel_ms", self.servo.accel_ms),
-            ("servo.decel_ms", self.servo.decel_ms),
-            ("brake.voltage_v", self.brake.voltage_v),
-            ("brake.current_limit_a", self.brake.current_limit_a),
-            ("brake.step_up", self.brake.step_up),
-            ("limits.speed_rpm", self.limits.speed_rpm),
-            ("limits.load_nm", self.limits.load_nm),
-            ("limits.slip_power_w", self.limits.slip_power_w),
-            ("limits.brake_temperature_c", self.limits.brake_temperature_c),
-            ("limits.te_excursion_mrad", self.limits.te_excursion_mrad),
-            ("limits.encoder_silence_ms", self.limits.encoder_silence_ms),
-            ("sequence.home_rpm", self.sequence.home_rpm),
-            ("sequence.settle_s", self.sequence.settle_s),
-            ("sequence.settle_turns", self.sequence.settle_turns),
-            ("sequence.load_s", self.sequence.load_s),
-            ("sequence.poll_ms", self.sequence.poll_ms),
-        ];
-        for (key, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return refuse(key, value.to_string(), "a finite number > 0".into());
+        // Wide enough for any rig, and narrow enough that no time computed from them is longer than a clock can hold.
+        for (key, value, least, most) in [
+            ("servo.reduction", self.servo.reduction, 1e-3, 1e5),
+            ("servo.accel_ms", self.servo.accel_ms, 1e-3, 1e6),
+            ("servo.decel_ms", self.servo.decel_ms, 1e-3, 1e6),
+            ("brake.voltage_v", self.brake.voltage_v, 1e-3, 1e4),
+            ("brake.current_limit_a", self.brake.current_limit_a, 1e-6, 1e3),
+            ("brake.step_up", self.brake.step_up, 1e-3, 1e4),
+            ("limits.speed_rpm", self.limits.speed_rpm, SLOWEST_RPM, 1e5),
+            ("limits.load_nm", self.limits.load_nm, 1e-6, 1e6),
+            ("limits.slip_power_w", self.limits.slip_power_w, 1e-6, 1e6),
+            ("limits.brake_temperature_c", self.limits.brake_temperature_c, 1.0, 1e3),
+            ("limits.te_excursion_mrad", self.limits.te_excursion_mrad, 1e-6, 1e4),
+            ("limits.encoder_silence_ms", self.limits.encoder_silence_ms, 1.0, 6e4),
+            ("sequence.home_rpm", self.sequence.home_rpm, SLOWEST_RPM, 1e5),
+            ("sequence.settle_s", self.sequence.settle_s, 1e-3, 3600.0),
+            ("sequence.settle_turns", self.sequence.settle_turns, 1e-3, 1e3),
+            ("sequence.load_s", self.sequence.load_s, 1e-3, 3600.0),
+            ("sequence.poll_ms", self.sequence.poll_ms, 1.0, 5e3),
+        ] {
+            if !(least..=most).contains(&value) {
+                return refuse(key, value.to_string(), format!("from {least} to {most}"));
             }
         }
         let lease = self.sequence.lease_s;

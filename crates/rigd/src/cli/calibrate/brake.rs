@@ -14,7 +14,7 @@ use super::super::{Exit, fail, stop};
 use super::{Output, date};
 use crate::calibration::{BrakeCalibration, Calibration};
 use crate::pair;
-use crate::profile::Profile;
+use crate::profile::{Profile, SLOWEST_RPM};
 use crate::quantity::{SPEED, TORQUE};
 use crate::run::Plan;
 use crate::run::brake_sweep::{self, SweepPlan, Swept};
@@ -133,8 +133,8 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
         let expected = format!("over 0 and at most brake.current_limit_a = {}", profile.brake.current_limit_a);
         refuse("--max-current", max_a, "A", expected)?;
     }
-    if !(args.rpm > 0.0 && args.rpm <= limits.speed_rpm) {
-        refuse("--rpm", args.rpm, "rpm", format!("over 0 and at most limits.speed_rpm = {}", limits.speed_rpm))?;
+    if !(SLOWEST_RPM..=limits.speed_rpm).contains(&args.rpm) {
+        refuse("--rpm", args.rpm, "rpm", format!("from {SLOWEST_RPM} to limits.speed_rpm = {}", limits.speed_rpm))?;
     }
     if !(0.0..=50.0).contains(&args.torque_uncertainty) {
         refuse("--torque-uncertainty", args.torque_uncertainty, "%", "from 0 to 50".into())?;
