@@ -39,53 +39,74 @@ fn stands(name: &str, sim: &Sim, since: SystemTime, limit_s: f64) {
     assert!(took_s <= limit_s, "{name}: {took_s} s");
 }
 
-#[test]
-fn a_killed_or_frozen_daemon() {
-    for signal in [Signal::SIGKILL, Signal::SIGSTOP] {
-        let sim = Sim::start(1);
-        let profile = sim.profile(|_| {});
-        let mut run = recording(&sim, &profile);
-        let since = SystemTime::now();
-        run.process.signal(signal);
-        stands(signal.as_str(), &sim, since, limit_s(&profile, 0.0));
-        assert!(sim.shafts().last().is_some_and(|shaft| !shaft.servo_on), "{signal}: servo off by its watchdog");
-        if signal == Signal::SIGSTOP {
-            // Thawed, it finds its lease run out, and does not take up what it was doing.
-            run.process.signal(Signal::SIGCONT);
-            let ended = run.wait(20.0);
-            assert_eq!(ended.code, Some(5), "{}", ended.stderr);
-            assert!(ended.stderr.contains("lease") || ended.stderr.contains("0x0020"), "{}", ended.stderr);
-            assert!(!sim.shafts().iter().rev().take(100).any(|shaft| shaft.turns()));
-            run.assert_whole();
-        }
+/// The daemon gets a signal that it cannot handle.
+fn struck(signal: Signal) {
+    let sim = Sim::start(1);
+    let profile = sim.profile(|_| {});
+    let mut run = recording(&sim, &profile);
+    let since = SystemTime::now();
+    run.process.signal(signal);
+    stands(signal.as_str(), &sim, since, limit_s(&profile, 0.0));
+    assert!(sim.shafts().last().is_some_and(|shaft| !shaft.servo_on), "{signal}: servo off by its watchdog");
+    if signal == Signal::SIGSTOP {
+        // Thawed, it finds its lease run out, and does not take up what it was doing.
+        run.process.signal(Signal::SIGCONT);
+        let ended = run.wait(20.0);
+        assert_eq!(ended.code, Some(5), "{}", ended.stderr);
+        assert!(ended.stderr.contains("lease") || ended.stderr.contains("0x0020"), "{}", ended.stderr);
+        assert!(!sim.shafts().iter().rev().take(100).any(|shaft| shaft.turns()));
+        run.assert_whole();
     }
 }
 
 #[test]
-fn an_unplugged_device() {
-    for device in ["servo", "brake", "counter"] {
-        for fault in [Fault::Unplugged, Fault::Silent] {
-            let sim = Sim::start(2);
-            let mut cable = Cable::to(&sim.port(device));
-            let profile = sim.profile(|profile| {
-                let port = cable.path.display().to_string();
-                match device {
-                    "servo" => profile.servo.port = port,
-                    "brake" => profile.brake.port = port,
-                    _ => profile.counter.port = port,
-                }
-            });
-            let mut run = recording(&sim, &profile);
-            let since = SystemTime::now();
-            cable.set(fault);
-            // A silent brake is asked three times before it counts as lost.
-            let notice_s = if fault == Fault::Silent { 1.5 } else { 0.0 };
-            stands(&format!("{device} {fault:?}"), &sim, since, limit_s(&profile, notice_s));
-            assert_eq!(run.wait(30.0).code, Some(5));
-            assert!(sim.shafts().last().is_some_and(|shaft| !shaft.servo_on), "{device} {fault:?}: servo off");
-            cable.pull();
-        }
+fn a_killed_daemon() {
+    struck(Signal::SIGKILL);
+}
+
+#[test]
+fn a_frozen_daemon() {
+    struck(Signal::SIGSTOP);
+}
+
+/// A device whose plug is pulled, and one that falls silent.
+fn lost(device: &str) {
+    for fault in [Fault::Unplugged, Fault::Silent] {
+        let sim = Sim::start(2);
+        let mut cable = Cable::to(&sim.port(device));
+        let profile = sim.profile(|profile| {
+            let port = cable.path.display().to_string();
+            match device {
+                "servo" => profile.servo.port = port,
+                "brake" => profile.brake.port = port,
+                _ => profile.counter.port = port,
+            }
+        });
+        let mut run = recording(&sim, &profile);
+        let since = SystemTime::now();
+        cable.set(fault);
+        // A silent brake is asked three times before it counts as lost.
+        let notice_s = if fault == Fault::Silent { 1.5 } else { 0.0 };
+        stands(&format!("{device} {fault:?}"), &sim, since, limit_s(&profile, notice_s));
+        assert_eq!(run.wait(30.0).code, Some(5));
+        assert!(sim.shafts().last().is_some_and(|shaft| !shaft.servo_on), "{device} {fault:?}: servo off");
+        cable.pull();
     }
+}
+
+#[test]
+fn a_lost_servo() {
+    lost("servo");
+}
+
+#[test]
+fn a_lost_brake() {
+    lost("brake");
+}
+
+#[test]
+fn a_lost_counter() {
+    lost("counter");
 }
 
 #[test]
