@@ -4,8 +4,8 @@ use async_trait::async_trait;
 
 use super::bus::BusStatistics;
 use super::map::{BrakeRules, Map, Mapped};
-use super::unmapped::Unmapped;
-use super::{Brake, BrakeStatus, DeviceError, Identity};
+use super::stand_in::StandIn;
+use super::{Brake, BrakeStatus, DeviceError, Identity, Part};
 use crate::link::{Address, Link};
 use crate::profile::BrakeProfile;
 
@@ -24,7 +24,7 @@ pub fn open(link: Link, address: Address, profile: &BrakeProfile) -> Box<dyn Bra
             let model = map.models.first().cloned();
             Box::new(MappedBrake { device: Mapped { bus, map, model }, rules })
         }
-        Err(reason) => Box::new(Unmapped { device: "brake", reason }),
+        Err(reason) => Box::new(StandIn::unmapped(Part::Brake, reason)),
     }
 }
 

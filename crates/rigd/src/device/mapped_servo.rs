@@ -6,8 +6,8 @@ use async_trait::async_trait;
 
 use super::bus::{BusError, BusStatistics};
 use super::map::{Map, Mapped, ServoRules, Step};
-use super::unmapped::Unmapped;
-use super::{DeviceError, Identity, Servo, ServoStatus};
+use super::stand_in::StandIn;
+use super::{DeviceError, Identity, Part, Servo, ServoStatus};
 use crate::link::{Address, Link};
 use crate::profile::ServoProfile;
 
@@ -28,7 +28,7 @@ pub fn open(link: Link, address: Address, profile: &ServoProfile) -> Box<dyn Ser
             let bus = map.bus(link, address, profile.unit, profile.horizon());
             Box::new(MappedServo { name: map.title.clone(), device: Mapped { bus, map, model: None }, rules })
         }
-        Err(reason) => Box::new(Unmapped { device: "servo", reason }),
+        Err(reason) => Box::new(StandIn::unmapped(Part::Servo, reason)),
     }
 }
 
