@@ -37,7 +37,7 @@ pub fn main(args: &Args) -> Exit {
         eprintln!("warning: {} N·m is below the brake's drag of {drag_nm} N·m; the drag remains", args.load);
     }
     if !args.common.json {
-        print(&format!("the brake holds {} N·m for {} s at most; Ctrl-C ends it", args.load, args.common.seconds));
+        print(&format!("the brake will hold {} N·m for {} s at most; Ctrl-C ends it", args.load, args.common.seconds));
     }
     let heat_j = Cell::new(0.0);
     let task = Task {

@@ -123,6 +123,12 @@ pub fn conduct(
         eprintln!("error: --logs {}: {error}; name a directory that you may write", common.logs.display());
         return Exit::BadInput;
     }
+    if !common.json {
+        print(&match profile.name.as_str() {
+            "sim" => "SIMULATED RIG: real registers and frames, emulated hardware".to_owned(),
+            name => format!("rig '{name}'"),
+        });
+    }
     let path = session::free_path(&common.logs, &task.name);
     let head = LogHead { operator: common.operator.clone(), note: task.name.clone(), pair_toml, plan_toml: None };
     let work = OnRig {
