@@ -6,7 +6,7 @@ use riglog::RunMetadata;
 use serde_json::json;
 
 use super::set_up::{self, Common, Refusal, Task};
-use super::{Exit, fail, print};
+use super::{Exit, fail};
 use crate::profile::Profile;
 use crate::quantity::TORQUE;
 use crate::run::rig::Rig;
@@ -36,12 +36,10 @@ pub fn main(args: &Args) -> Exit {
     if args.load < drag_nm {
         eprintln!("warning: {} N·m is below the brake's drag of {drag_nm} N·m; the drag remains", args.load);
     }
-    if !args.common.json {
-        print(&format!("the brake will hold {} N·m for {} s at most; Ctrl-C ends it", args.load, args.common.seconds));
-    }
     let heat_j = Cell::new(0.0);
     let task = Task {
         name: format!("brake_{}Nm", args.load),
+        opening: format!("the brake holds {} N·m for {} s at most; Ctrl-C ends it", args.load, args.common.seconds),
         conditions: RunMetadata { load_nm: vec![args.load], ..RunMetadata::default() },
         schema: "rigd.brake/1",
         figures: &|| json!({"load_nm": args.load, "heat_j": heat_j.get()}),

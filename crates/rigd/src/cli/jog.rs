@@ -90,6 +90,10 @@ pub fn main(args: &Args) -> Exit {
     };
     let task = Task {
         name: format!("jog_{direction}_{}rpm", args.rpm),
+        opening: format!(
+            "turns the driver {direction} at {} rpm for {} s at most; Ctrl-C ends it",
+            args.rpm, args.common.seconds
+        ),
         conditions: RunMetadata {
             direction: direction.to_string(),
             load_nm: vec![0.0],

@@ -85,6 +85,8 @@ pub enum Refusal {
 pub struct Task<'a> {
     /// `jog` or `brake`, with its conditions, for the log's name.
     pub name: String,
+    /// Told before anything is opened.
+    pub opening: String,
     /// For the log.
     pub conditions: RunMetadata,
     /// Schema of the JSON answer.
@@ -128,6 +130,7 @@ pub fn conduct(
             "sim" => "SIMULATED RIG: real registers and frames, emulated hardware".to_owned(),
             name => format!("rig '{name}'"),
         });
+        print(&task.opening);
     }
     let path = session::free_path(&common.logs, &task.name);
     let head = LogHead { operator: common.operator.clone(), note: task.name.clone(), pair_toml, plan_toml: None };
