@@ -47,8 +47,8 @@ fuzz SECONDS="600":
 
 # SIGKILL at 200 random instants of a run: at most 250 ms lost each time, every log opens, every next run goes on.
 kill-200:
-    cargo test --release -p rigd --test kill -- --ignored --nocapture
+    cargo test --release --workspace --test kill -- --ignored --nocapture
 
 # Eight simulated hours of a campaign with random faults: no leak, no loss unmarked, every run finished. HOURS and SEED may be given.
 soak HOURS="8" SEED="1":
-    RIG_HOURS={{HOURS}} RIG_SEED={{SEED}} cargo test --release -p rigd --test soak -- --ignored --nocapture
+    RIG_HOURS={{HOURS}} RIG_SEED={{SEED}} cargo test --release --workspace --test soak -- --ignored --nocapture

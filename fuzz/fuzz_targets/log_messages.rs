@@ -3,7 +3,7 @@
 #![no_main]
 
 use std::collections::BTreeMap;
-use std::io::{Cursor, Write as _};
+use std::io::Cursor;
 use std::ops::ControlFlow;
 
 use libfuzzer_sys::fuzz_target;
@@ -71,9 +71,10 @@ fn log(mut data: &[u8]) -> Option<Vec<u8>> {
 
 fuzz_target!(|data: &[u8]| {
     let Some(bytes) = log(data) else { return };
-    let mut file = tempfile::NamedTempFile::with_suffix(".mcap").expect("a file");
-    file.write_all(&bytes).expect("room");
-    let path = file.path();
+    // A directory, for what a recovery sets aside goes with it.
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = &directory.path().join("log.mcap");
+    std::fs::write(path, &bytes).expect("room");
     if let Ok(stream) = RunStream::open_parts(LogParts::alone(path)) {
         let mut count = Count(0);
         if let Ok(totals) = stream.stream(&mut count) {

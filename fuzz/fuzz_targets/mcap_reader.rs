@@ -2,7 +2,7 @@
 //! as many messages as were readable.
 #![no_main]
 
-use std::io::{Cursor, Write as _};
+use std::io::Cursor;
 use std::ops::ControlFlow;
 
 use libfuzzer_sys::fuzz_target;
@@ -33,17 +33,19 @@ fuzz_target!(|data: &[u8]| {
     if !data.starts_with(&MAGIC) {
         read(&[&MAGIC[..], data].concat());
     }
-    let mut file = tempfile::NamedTempFile::with_suffix(".mcap").expect("a file");
-    file.write_all(data).expect("room");
-    if let Ok(stream) = RunStream::open(file.path()) {
+    // A directory, for what the recovery sets aside goes with it.
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = &directory.path().join("log.mcap");
+    std::fs::write(path, data).expect("room");
+    if let Ok(stream) = RunStream::open(path) {
         let mut count = Count(0);
         if let Ok(totals) = stream.stream(&mut count) {
             assert_eq!(totals.samples(), count.0);
         }
     }
-    let before = riglog::info(file.path());
-    if let (Ok(done), Ok(before)) = (recover(file.path()), before) {
-        let after = riglog::info(file.path()).expect("what was recovered is readable");
+    let before = riglog::info(path);
+    if let (Ok(done), Ok(before)) = (recover(path), before) {
+        let after = riglog::info(path).expect("what was recovered is readable");
         let sum = |info: &riglog::LogInfo| info.channels.iter().map(|channel| channel.messages).sum::<u64>();
         if !done.already_complete {
             assert!(after.completeness.is_complete(), "{:?}", after.completeness);

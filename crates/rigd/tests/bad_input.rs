@@ -54,6 +54,8 @@ fn limits_are_named_with_value_and_key() {
     let refused = Refused::new();
     refused.expect(&["run", "--load", "500Nm", "--rpm", "5"], &["500", "20", "N·m", "limits.load_nm"]);
     refused.expect(&["run", "--load", "10Nm", "--rpm", "1000"], &["1000", "60", "rpm", "limits.speed_rpm"]);
+    refused.expect(&["run", "--load", "10Nm", "--rpm", "1e-300"], &["too slow", "0.01 rpm"]);
+    refused.expect(&["jog", "--turn", "--rpm", "0.0099"], &["too slow", "0.01 rpm"]);
     refused.expect(&["run", "--load", "20Nm", "--rpm", "60"], &["W", "limits.slip_power_w"]);
     refused.expect(&["run", "--load", "5Nm", "--rpm", "5", "--rate", "5000kHz"], &["5000000", "1 MHz"]);
 }

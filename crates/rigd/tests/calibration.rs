@@ -3,41 +3,10 @@
 
 mod support;
 
-use std::path::PathBuf;
-use std::process::Output;
-
 use rigd::calibration::Calibration;
 use rigd::profile::Profile;
 use rigd::sim::plant::{BrakeSpec, PlantSpec};
-use serde_json::Value;
-use support::rigd;
-use tempfile::TempDir;
-
-struct Bench {
-    directory: TempDir,
-}
-
-impl Bench {
-    fn new() -> Self {
-        Self { directory: TempDir::new().expect("a temporary directory") }
-    }
-
-    fn at(&self, name: &str) -> PathBuf {
-        self.directory.path().join(name)
-    }
-
-    fn run(&self, line: &str) -> Output {
-        let words = line.split_whitespace().map(|word| word.replace('@', &self.directory.path().display().to_string()));
-        rigd(self.directory.path()).args(words).output().expect("it runs")
-    }
-
-    fn json(&self, code: i32, line: &str) -> Value {
-        let output = self.run(line);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{line}: {said}");
-        serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{line}: {error}: {said}"))
-    }
-}
+use support::desk::Desk;
 
 /// (rising, falling) torque of the plant at a current, N·m, by the points of its own curve.
 fn truth(current_a: f64) -> (f64, f64) {
@@ -51,12 +20,12 @@ fn truth(current_a: f64) -> (f64, f64) {
 
 #[test]
 fn the_brakes_curve_is_the_plants_within_its_uncertainty() {
-    let bench = Bench::new();
+    let desk = Desk::new();
     // The stated torque constant and drag are the plant's; what is left is what the measurement itself scatters.
     let line =
         "calibrate brake --drag 0.3Nm --drag-uncertainty 0.02Nm --torque-uncertainty 0.5 --logs @/runs --json --out";
-    bench.json(0, &format!("{line} @/calibration.toml --rated-torque 2.39Nm"));
-    let found = Calibration::load(&bench.at("calibration.toml")).expect("a calibration").0.brake.expect("a brake");
+    desk.json(0, &format!("{line} @/calibration.toml --rated-torque 2.39Nm"));
+    let found = Calibration::load(&desk.at("calibration.toml")).expect("a calibration").0.brake.expect("a brake");
     let highest = found.rising.last().expect("points")[0];
     let mut worst = 0.0f64;
     for (branch, rising) in [(&found.rising, true), (&found.falling, false)] {
@@ -82,12 +51,12 @@ fn the_brakes_curve_is_the_plants_within_its_uncertainty() {
     assert!(found.falling[middle][1] - found.rising[middle][1] > found.falling[middle][2] + found.rising[middle][2]);
 
     // A name plate that is read 5 % wrong gives a curve that the plant does not have.
-    bench.json(0, &format!("{line} @/wrong.toml --rated-torque 2.51Nm"));
-    let wrong = Calibration::load(&bench.at("wrong.toml")).expect("a calibration").0.brake.expect("a brake");
+    desk.json(0, &format!("{line} @/wrong.toml --rated-torque 2.51Nm"));
+    let wrong = Calibration::load(&desk.at("wrong.toml")).expect("a calibration").0.brake.expect("a brake");
     assert!(wrong.rising.iter().any(|point| (point[1] - truth(point[0]).0).abs() > point[2]));
 
     // A run takes the curve over, and its log carries the calibration.
-    let ran = bench.json(
+    let ran = desk.json(
         0,
         "run --load 8Nm --rpm 20 --revs 1 --direction ccw --rate 1kHz --calibration @/calibration.toml --out @/runs --json",
     );
@@ -96,7 +65,7 @@ fn the_brakes_curve_is_the_plants_within_its_uncertainty() {
         let found = info.attachments.iter().find(|attachment| attachment.name == name).expect("an attachment");
         String::from_utf8(found.data.clone().expect("kept")).expect("text")
     };
-    assert_eq!(attached("calibration.toml"), std::fs::read_to_string(bench.at("calibration.toml")).expect("a file"));
+    assert_eq!(attached("calibration.toml"), std::fs::read_to_string(desk.at("calibration.toml")).expect("a file"));
     let profile = Profile::parse(&attached("rig.toml"), "rig.toml".as_ref()).expect("a profile");
     assert_eq!(profile.brake.rising.len(), found.rising.len());
     let current = profile.brake.current_a(8.0).expect("within");
@@ -105,23 +74,23 @@ fn the_brakes_curve_is_the_plants_within_its_uncertainty() {
 
 #[test]
 fn limits_hold_for_calibrations_too() {
-    let bench = Bench::new();
+    let desk = Desk::new();
     for (line, needles) in [
         ("--rated-torque 2.39Nm --max-current 5", &["--max-current", "brake.current_limit_a"][..]),
         ("--rated-torque 2.39Nm --rpm 500", &["--rpm", "limits.speed_rpm"]),
         ("--rated-torque 2.39Nm --rpm 60", &["W", "limits.slip_power_w"]),
         ("--rated-torque 0Nm", &["--rated-torque"]),
     ] {
-        let output = bench.run(&format!("calibrate brake --logs @/runs --out @/c.toml {line}"));
+        let output = desk.run(&format!("calibrate brake --logs @/runs --out @/c.toml {line}"));
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{line}: {said}");
         assert!(needles.iter().all(|needle| said.contains(needle)), "{line}: {said}");
-        assert!(!bench.at("c.toml").exists());
+        assert!(!desk.at("c.toml").exists());
     }
 }
 
 /// Logs of the same run with the disc at these places, each on another day of the rig.
-fn mounted(bench: &Bench, which: &str, effect: &str, degrees: &[f64]) -> Vec<String> {
+fn mounted(desk: &Desk, which: &str, effect: &str, degrees: &[f64]) -> Vec<String> {
     degrees
         .iter()
         .enumerate()
@@ -132,8 +101,8 @@ fn mounted(bench: &Bench, which: &str, effect: &str, degrees: &[f64]) -> Vec<Str
                 _ => profile.counter.output_mounted_deg = *degrees,
             }
             let name = format!("{which}{degrees}.toml");
-            std::fs::write(bench.at(&name), profile.to_toml()).expect("a file");
-            let ran = bench.json(
+            std::fs::write(desk.at(&name), profile.to_toml()).expect("a file");
+            let ran = desk.json(
                 0,
                 &format!(
                     "run --load 5Nm --rpm 20 --revs 4 --direction both --rate 2kHz --profile @/{name} --seed {} --undocumented {effect} --out @/{which} --json",
@@ -148,13 +117,13 @@ fn mounted(bench: &Bench, which: &str, effect: &str, degrees: &[f64]) -> Vec<Str
 #[test]
 fn a_disc_turned_on_its_shaft_tells_its_own_errors_from_everything_elses() {
     for which in ["input", "output"] {
-        let bench = Bench::new();
+        let desk = Desk::new();
         let (effect, key) = match which {
             "input" => ("encoder1_eccentricity", "encoder_input"),
             _ => ("encoder2_eccentricity", "encoder_output"),
         };
-        let logs = mounted(&bench, which, effect, &[0.0, 120.0, 240.0]).join(" ");
-        let told = bench.json(0, &format!("calibrate encoder {which} {logs} --out @/calibration.toml --json"));
+        let logs = mounted(&desk, which, effect, &[0.0, 120.0, 240.0]).join(" ");
+        let told = desk.json(0, &format!("calibrate encoder {which} {logs} --out @/calibration.toml --json"));
         // The plant's own disc.
         let mut spec = PlantSpec::default();
         rigd::sim::plant::undocumented::find(effect).expect("an effect").apply_usual(&mut spec);
@@ -183,10 +152,10 @@ fn a_disc_turned_on_its_shaft_tells_its_own_errors_from_everything_elses() {
         // The snippet is what the pair file takes.
         let pair = format!("{}\n{snippet}", rigd::profile::DEFAULT_PAIR);
         rigd::pair::parse(&pair, "pair.toml".as_ref()).expect("a pair");
-        assert!(std::fs::read_to_string(bench.at("calibration.toml")).expect("a file").contains(key));
+        assert!(std::fs::read_to_string(desk.at("calibration.toml")).expect("a file").contains(key));
         // One place of the disc tells nothing.
         let one = logs.split(' ').next().expect("a log");
-        let output = bench.run(&format!("calibrate encoder {which} {one} --out @/calibration.toml"));
+        let output = desk.run(&format!("calibrate encoder {which} {one} --out @/calibration.toml"));
         assert_eq!(output.status.code(), Some(2));
         assert!(String::from_utf8_lossy(&output.stderr).contains("mounted_deg"));
     }
@@ -194,10 +163,10 @@ fn a_disc_turned_on_its_shaft_tells_its_own_errors_from_everything_elses() {
 
 #[test]
 fn the_zeros_of_a_rig_without_errors_are_none() {
-    let bench = Bench::new();
-    let ran = bench.json(0, "run --load 5Nm --rpm 20 --revs 3 --direction both --rate 2kHz --out @/runs --json");
+    let desk = Desk::new();
+    let ran = desk.json(0, "run --load 5Nm --rpm 20 --revs 3 --direction both --rate 2kHz --out @/runs --json");
     let log = ran["log"][0].as_str().expect("a log");
-    let told = bench.json(0, &format!("calibrate zero {log} --out @/calibration.toml --json"));
+    let told = desk.json(0, &format!("calibrate zero {log} --out @/calibration.toml --json"));
     let zero = &told["zero"];
     let number = |key: &str| zero[key].as_f64().expect("a number");
     println!("{zero}");

@@ -88,26 +88,29 @@ fn every_run_has_a_whole_log_and_all_share_one_clock_and_one_zero() {
     assert!(other.code == Some(2) && other.stderr.contains("--out"), "{}", other.stderr);
 }
 
-#[test]
-fn a_campaign_that_was_killed_goes_on_at_its_first_unfinished_run() {
+/// Kills a campaign once so many runs are finished, each time in the middle of the next run, and takes it up again at last. Each log
+/// is one file, or split at `rotate_mb`.
+fn killed_and_resumed(seed: u64, rotate_mb: f64, kills_after: &[usize]) {
     let home = tempfile::TempDir::new().expect("a directory");
-    let sim = Sim::start(5);
-    let profile = sim.profile(|_| {}).display().to_string();
-    let mut kills = 0;
-    for done in [1, 3] {
+    let sim = Sim::start(seed);
+    let profile = sim.profile(|profile| profile.log.rotate_mb = rotate_mb).display().to_string();
+    for &done in kills_after {
         let mut run = start(home.path(), PLAN, &["--profile", &profile]);
         wait_for("finished runs", 60.0, || {
             (journal(home.path()).matches("\"what\":\"finished\"").count() >= done).then_some(())
         });
-        // Somewhere in the next run.
+        // Somewhere in the next run, once its log has several parts where logs are split.
         std::thread::sleep(Duration::from_millis(1700));
+        if rotate_mb > 0.0 {
+            wait_for("parts", 20.0, || unfinished(home.path()).iter().any(|log| log.contains(".part3.")).then_some(()));
+        }
         run.process.signal(Signal::SIGKILL);
         run.process.wait(5.0);
-        kills += 1;
     }
+    let left = unfinished(home.path());
     let ended = start(home.path(), PLAN, &["--profile", &profile]).wait(120.0);
     assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-    assert!(ended.stderr.contains("put aside"), "{}", ended.stderr);
+    assert_eq!(ended.stderr.matches("put aside").count(), 1, "a log once, however many parts: {}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).expect("JSON");
     let runs = report["runs"].as_array().expect("runs");
     assert_eq!((runs.len(), report["losses"].as_u64()), (6, Some(0)));
@@ -116,12 +119,42 @@ fn a_campaign_that_was_killed_goes_on_at_its_first_unfinished_run() {
         let finished = format!("\"what\":\"finished\",\"run\":{run},");
         assert_eq!(text.matches(&finished).count(), 1, "run {run} was done once: {text}");
     }
-    assert_eq!(logs(home.path()).len(), 6, "only finished runs lie here");
-    let aside = std::fs::read_dir(home.path().join("logs/unfinished")).expect("put aside").count();
-    assert_eq!(aside, kills);
-    for log in logs(home.path()) {
-        assert!(riglog::info(&log).expect("a log").completeness.is_complete());
+    assert!(unfinished(home.path()).is_empty(), "only finished runs lie here: {:?}", unfinished(home.path()));
+    let whole = riglog::LogParts::group(&logs(home.path())).expect("logs");
+    assert_eq!(whole.len(), 6);
+    for log in &whole {
+        assert_eq!(log.is_split(), rotate_mb > 0.0, "{}", log.first().display());
+        assert!(riglog::info(log.first()).expect("a log").completeness.is_complete(), "{}", log.first().display());
     }
+    // Every part of the last run that was killed lies aside, and each kill left one log there.
+    let aside: Vec<_> = std::fs::read_dir(home.path().join("logs/unfinished"))
+        .expect("put aside")
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    assert!(!left.is_empty() && left.iter().all(|part| aside.contains(part)), "{left:?} in {aside:?}");
+    let paths: Vec<_> = aside.iter().map(|name| home.path().join("logs/unfinished").join(name)).collect();
+    assert_eq!(riglog::LogParts::group(&paths).expect("logs").len(), kills_after.len(), "{aside:?}");
+    println!("rotation at {rotate_mb} MB: {} files of finished runs, {} aside", logs(home.path()).len(), aside.len());
+}
+
+/// Files here that belong to no run in the journal.
+fn unfinished(home: &Path) -> Vec<String> {
+    let text = journal(home);
+    let first = |log: &PathBuf| riglog::part_path(log, 1).file_name().expect("a name").to_string_lossy().into_owned();
+    let of_none = |log: &&PathBuf| !text.contains(&format!("\"log\":\"{}\"", first(log)));
+    let name = |log: &PathBuf| log.file_name().expect("a name").to_string_lossy().into_owned();
+    logs(home).iter().filter(of_none).map(name).collect()
+}
+
+#[test]
+fn a_campaign_that_was_killed_goes_on_at_its_first_unfinished_run() {
+    killed_and_resumed(5, 0.0, &[1, 3]);
+}
+
+#[test]
+fn a_campaign_whose_logs_are_split_is_killed_and_goes_on_alike() {
+    killed_and_resumed(8, 0.01, &[2]);
 }
 
 #[test]

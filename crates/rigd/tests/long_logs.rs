@@ -3,60 +3,10 @@
 
 mod support;
 
-use std::path::{Path, PathBuf};
-use std::process::Output;
+use std::path::Path;
 
-use rigd::profile::Profile;
 use serde_json::Value;
-use support::rigd;
-use tempfile::TempDir;
-
-struct Bench {
-    directory: TempDir,
-}
-
-impl Bench {
-    fn new() -> Self {
-        Self { directory: TempDir::new().expect("a temporary directory") }
-    }
-
-    fn at(&self, name: &str) -> PathBuf {
-        self.directory.path().join(name)
-    }
-
-    fn run(&self, line: &str) -> Output {
-        let arguments: Vec<String> = line
-            .split_whitespace()
-            .map(|word| word.replace('@', &self.directory.path().display().to_string()))
-            .collect();
-        rigd(self.directory.path()).args(arguments).output().expect("it runs")
-    }
-
-    /// Runs and expects an exit code and a JSON object.
-    fn json(&self, code: i32, line: &str) -> Value {
-        let output = self.run(line);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{line}: {said}");
-        serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{line}: {error}: {said}"))
-    }
-
-    /// A profile of the simulated rig in this process.
-    fn profile(&self, edit: impl FnOnce(&mut Profile)) {
-        let mut profile = Profile::simulated();
-        edit(&mut profile);
-        std::fs::write(self.at("rig.toml"), profile.to_toml()).expect("a file");
-    }
-
-    fn logs(&self, directory: &str) -> Vec<PathBuf> {
-        let mut logs: Vec<_> = std::fs::read_dir(self.at(directory))
-            .expect("a directory")
-            .map(|entry| entry.expect("an entry").path())
-            .filter(|path| path.extension().is_some_and(|extension| extension == "mcap"))
-            .collect();
-        logs.sort();
-        logs
-    }
-}
+use support::desk::Desk;
 
 const RUN: &str =
     "run --load 5Nm --rpm 10 --revs 2 --direction both --rate 2kHz --profile @/rig.toml --out @/runs --json --quiet";
@@ -64,22 +14,22 @@ const RUN: &str =
 /// What replay, diagnosis, info and audit say of a log is what they say of each of its parts.
 #[test]
 fn the_parts_of_a_run_are_one_log_to_every_command() {
-    let bench = Bench::new();
-    bench.profile(|profile| profile.log.rotate_mb = 0.03);
-    let ran = bench.json(0, RUN);
-    let parts = bench.logs("runs");
+    let desk = Desk::new();
+    desk.profile(|profile| profile.log.rotate_mb = 0.03);
+    let ran = desk.json(0, RUN);
+    let parts = desk.logs("runs");
     assert!(parts.len() >= 4, "{parts:?}");
     let last = parts.iter().find(|path| path.to_string_lossy().contains(".part3.")).expect("a third part");
-    let replayed = bench.json(0, &format!("replay {} --json", last.display()));
+    let replayed = desk.json(0, &format!("replay {} --json", last.display()));
     assert_eq!(replayed["te_hash"], ran["te_hash"]);
     assert_eq!(replayed["samples"], ran["samples"]);
     let all: Vec<String> = parts.iter().map(|path| path.display().to_string()).collect();
-    let replayed = bench.json(0, &format!("replay {} --json", all.join(" ")));
+    let replayed = desk.json(0, &format!("replay {} --json", all.join(" ")));
     assert_eq!(replayed["te_hash"], ran["te_hash"], "all parts named are still one log");
-    let info = bench.json(0, &format!("info {} --json", parts[0].display()));
+    let info = desk.json(0, &format!("info {} --json", parts[0].display()));
     assert_eq!(info["parts"].as_array().map(Vec::len), Some(parts.len()));
     assert_eq!((info["runs"].as_array().map(Vec::len), &info["losses_in_file"]), (Some(2), &Value::from(0)));
-    let audit = bench.json(0, &format!("audit {} --json", all.join(" ")));
+    let audit = desk.json(0, &format!("audit {} --json", all.join(" ")));
     println!("audit of {} parts: {}", parts.len(), audit["logs"][0]);
     assert_eq!((audit["logs"].as_array().map(Vec::len), &audit["logs"][0]["losses"]), (Some(1), &Value::from(0)));
     assert_eq!(audit["logs"][0]["samples"], info["samples_in_file"]);
@@ -87,30 +37,30 @@ fn the_parts_of_a_run_are_one_log_to_every_command() {
     // Without its second part it is no longer clean, and every command says so by its exit code.
     let second = parts.iter().find(|path| path.to_string_lossy().contains(".part2.")).expect("a second part");
     std::fs::remove_file(second).expect("it goes");
-    let audit = bench.json(3, &format!("audit {} --json", parts[0].display()));
+    let audit = desk.json(3, &format!("audit {} --json", parts[0].display()));
     assert!(audit["logs"][0]["losses"].as_u64().expect("a count") > 0);
-    bench.json(3, &format!("info {} --json", parts[0].display()));
-    bench.json(3, &format!("replay {} --json", parts[0].display()));
+    desk.json(3, &format!("info {} --json", parts[0].display()));
+    desk.json(3, &format!("replay {} --json", parts[0].display()));
 }
 
 #[test]
 fn an_exported_log_comes_back_with_the_same_te_bit_by_bit() {
-    let bench = Bench::new();
-    bench.profile(|_| {});
-    let ran = bench.json(0, RUN);
-    let log = bench.logs("runs").remove(0);
-    std::fs::write(bench.at("pair.toml"), rigd::profile::DEFAULT_PAIR).expect("a file");
+    let desk = Desk::new();
+    desk.profile(|_| {});
+    let ran = desk.json(0, RUN);
+    let log = desk.logs("runs").remove(0);
+    std::fs::write(desk.at("pair.toml"), rigd::profile::DEFAULT_PAIR).expect("a file");
     let mut formats = vec!["csv"];
     if cfg!(feature = "parquet") {
         formats.push("parquet");
     }
     for format in formats {
-        let told = bench.json(0, &format!("export {} --to {format} --out @/table.{format} --json", log.display()));
+        let told = desk.json(0, &format!("export {} --to {format} --out @/table.{format} --json", log.display()));
         assert_eq!((&told["rows"], &told["losses"]), (&ran["samples"], &Value::from(0)));
         for column in ["time_s", "theta1_rad", "load_nm", "speed_rpm", "te_rad", "time_unix_ns"] {
             assert!(told["columns"].as_array().expect("names").contains(&column.into()), "{column}");
         }
-        let back = bench.json(
+        let back = desk.json(
             0,
             &format!(
                 "import @/table.{format} --pair @/pair.toml --counts-per-rev 7200000 --out @/{format}.mcap --json"
@@ -119,12 +69,12 @@ fn an_exported_log_comes_back_with_the_same_te_bit_by_bit() {
         assert_eq!(back["te_hash"], ran["te_hash"], "{format}");
         // Never over what is there.
         assert_eq!(
-            bench.run(&format!("export {} --to {format} --out @/table.{format}", log.display())).status.code(),
+            desk.run(&format!("export {} --to {format} --out @/table.{format}", log.display())).status.code(),
             Some(2)
         );
     }
-    bench.json(0, &format!("export {} --to npy --out @/table.npy --json", log.display()));
-    numpy_agrees(&bench.at("table.npy"), &bench.at("table.csv"));
+    desk.json(0, &format!("export {} --to npy --out @/table.npy --json", log.display()));
+    numpy_agrees(&desk.at("table.npy"), &desk.at("table.csv"));
 }
 
 /// Another reader of the array, where Python with NumPy is there.
@@ -145,35 +95,35 @@ fn numpy_agrees(npy: &Path, csv: &Path) {
 
 #[test]
 fn a_cut_log_is_recovered_and_its_end_is_told() {
-    let bench = Bench::new();
-    bench.profile(|_| {});
-    bench.json(0, RUN);
-    let log = bench.logs("runs").remove(0);
+    let desk = Desk::new();
+    desk.profile(|_| {});
+    desk.json(0, RUN);
+    let log = desk.logs("runs").remove(0);
     let bytes = std::fs::read(&log).expect("a log");
     std::fs::write(&log, &bytes[..bytes.len() * 2 / 3]).expect("a cut log");
-    let audit = bench.json(3, &format!("audit {} --json", log.display()));
+    let audit = desk.json(3, &format!("audit {} --json", log.display()));
     assert_eq!(audit["logs"][0]["findings"][0]["kind"], "truncation");
     // Unfinished logs are none that retention may take.
-    let pruned = bench.json(0, "prune @/runs --keep-gb 0.000001 --delete --json");
+    let pruned = desk.json(0, "prune @/runs --keep-gb 0.000001 --delete --json");
     assert_eq!(pruned["chosen"].as_array().map(Vec::len), Some(0));
-    let done = bench.json(3, &format!("recover {} --json", log.display()));
+    let done = desk.json(3, &format!("recover {} --json", log.display()));
     assert!(done["logs"][0]["kept_messages"].as_u64().expect("a count") > 100, "{done}");
-    assert_eq!(bench.json(0, "recover @/runs --json")["logs"][0]["already_complete"], true);
-    assert_eq!(bench.json(0, &format!("audit {} --json", log.display()))["clean"], true);
+    assert_eq!(desk.json(0, "recover @/runs --json")["logs"][0]["already_complete"], true);
+    assert_eq!(desk.json(0, &format!("audit {} --json", log.display()))["clean"], true);
     // Listed first, deleted only when told so.
-    bench.json(0, "prune @/runs --keep-gb 0.000001 --json");
+    desk.json(0, "prune @/runs --keep-gb 0.000001 --json");
     assert!(log.exists());
-    bench.json(0, "prune @/runs --keep-gb 0.000001 --delete --json");
+    desk.json(0, "prune @/runs --keep-gb 0.000001 --delete --json");
     assert!(!log.exists());
-    assert_eq!(bench.run("prune @/runs").status.code(), Some(2), "what to keep must be said");
-    assert_eq!(bench.run("audit @/rig.toml").status.code(), Some(2));
+    assert_eq!(desk.run("prune @/runs").status.code(), Some(2), "what to keep must be said");
+    assert_eq!(desk.run("audit @/rig.toml").status.code(), Some(2));
 }
 
 #[test]
 fn little_room_is_a_warning_and_less_is_a_stop_before_the_run() {
-    let bench = Bench::new();
-    bench.profile(|profile| (profile.log.warn_free_mb, profile.log.stop_free_mb) = (1e9, 0.0));
-    let ran = bench.json(0, RUN);
+    let desk = Desk::new();
+    desk.profile(|profile| (profile.log.warn_free_mb, profile.log.stop_free_mb) = (1e9, 0.0));
+    let ran = desk.json(0, RUN);
     let log = ran["log"][0].as_str().expect("a log").to_owned();
     let events: Vec<String> = riglog::LogReader::open(&log)
         .expect("a log")
@@ -183,10 +133,10 @@ fn little_room_is_a_warning_and_less_is_a_stop_before_the_run() {
         })
         .collect();
     assert!(events.len() == 1 && events[0].contains("log.warn_free_mb"), "{events:?}");
-    bench.profile(|profile| profile.log.stop_free_mb = 1e9);
-    let refused = bench.run(RUN);
+    desk.profile(|profile| profile.log.stop_free_mb = 1e9);
+    let refused = desk.run(RUN);
     let said = String::from_utf8_lossy(&refused.stderr);
     assert_eq!(refused.status.code(), Some(1), "{said}");
     assert!(said.contains("log.stop_free_mb") && said.contains("free space"), "{said}");
-    assert_eq!(bench.logs("runs").len(), 1, "nothing was begun");
+    assert_eq!(desk.logs("runs").len(), 1, "nothing was begun");
 }

@@ -58,9 +58,49 @@ fn every_fault_has_file_and_line_and_the_exit_code_is_bad_input() {
         of("counter.driver")["what"].as_str().expect("text").contains("resol")
             || of("counter.driver")["what"].as_str().expect("text").contains("µrad")
     );
+    // A run tells them all as well.
+    let out = directory.path().join("runs");
+    let run =
+        command().args(["run", "--load", "5Nm", "--rpm", "5", "--profile"]).arg(&file).arg("--out").arg(&out).assert();
+    let said = String::from_utf8_lossy(&run.code(2).get_output().stderr).into_owned();
+    assert!(["leese_s", "log.chunk_ms", "counter.driver"].iter().all(|key| said.contains(key)), "{said}");
+    assert!(!out.exists(), "nothing was written");
     let plain = command().args(["profile", "check"]).arg(&file).assert().code(2);
     let said = String::from_utf8_lossy(&plain.get_output().stderr).into_owned();
     assert!(said.contains(&format!("{}:", file.display())), "{said}");
+}
+
+#[test]
+fn how_late_an_answer_may_come_and_who_shares_a_line_is_checked() {
+    let directory = TempDir::new().expect("a directory");
+    let file = directory.path().join("lab.toml");
+    let check = |text: String| {
+        std::fs::write(&file, text).expect("a file");
+        let output = command().args(["profile", "check"]).arg(&file).output().expect("it runs");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let with =
+        |keys: &str| rigd::profile::SIM_PROFILE.replace("reduction = 20.0", &format!("reduction = 20.0\n{keys}\n"));
+    for (keys, good) in [
+        ("late_ms = 10.0\nrepeated_ms = 10.0", true),
+        ("late_ms = 9.9\nrepeated_ms = 0.0", false),
+        ("late_ms = 5000.0", true),
+        ("late_ms = 5001.0", false),
+        ("late_ms = 300.0\nrepeated_ms = 301.0", false),
+    ] {
+        let (code, said) = check(with(keys));
+        assert_eq!(code, Some(if good { 0 } else { 2 }), "{keys}: {said}");
+        assert!(good || said.contains("_ms"), "{keys}: {said}");
+    }
+    // Servo and brake on one RS-485 line.
+    let mut profile = rigd::profile::Profile::simulated();
+    (profile.servo.port, profile.brake.port) = ("/dev/ttyUSB0".into(), "/dev/ttyUSB0".into());
+    profile.counter.port = "/dev/ttyUSB1".into();
+    let (code, said) = check(profile.to_toml());
+    assert!(code == Some(2) && said.contains("is also the servo's") && said.contains("a line of its own"), "{said}");
+    let run = command().args(["run", "--load", "5Nm", "--rpm", "5", "--profile"]).arg(&file).assert().code(2);
+    let said = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
+    assert!(said.contains("brake.port") && said.contains("a line of its own"), "{said}");
 }
 
 #[test]

@@ -11,6 +11,7 @@ use nix::sys::signal::Signal;
 use rigd::profile::Profile;
 use riglog::proto::Phase;
 use riglog::{LogReader, Record};
+use support::bench::events;
 use support::line::{Cable, Fault};
 use support::{Run, Sim, rigd};
 
@@ -38,53 +39,74 @@ fn stands(name: &str, sim: &Sim, since: SystemTime, limit_s: f64) {
     assert!(took_s <= limit_s, "{name}: {took_s} s");
 }
 
-#[test]
-fn a_killed_or_frozen_daemon() {
-    for signal in [Signal::SIGKILL, Signal::SIGSTOP] {
-        let sim = Sim::start(1);
-        let profile = sim.profile(|_| {});
-        let mut run = recording(&sim, &profile);
-        let since = SystemTime::now();
-        run.process.signal(signal);
-        stands(signal.as_str(), &sim, since, limit_s(&profile, 0.0));
-        assert!(sim.shafts().last().is_some_and(|shaft| !shaft.servo_on), "{signal}: servo off by its watchdog");
-        if signal == Signal::SIGSTOP {
-            // Thawed, it finds its lease run out, and does not take up what it was doing.
-            run.process.signal(Signal::SIGCONT);
-            let ended = run.wait(20.0);
-            assert_eq!(ended.code, Some(5), "{}", ended.stderr);
-            assert!(ended.stderr.contains("lease") || ended.stderr.contains("0x0020"), "{}", ended.stderr);
-            assert!(!sim.shafts().iter().rev().take(100).any(|shaft| shaft.turns()));
-            run.assert_whole();
-        }
+/// The daemon gets a signal that it cannot handle.
+fn struck(signal: Signal) {
+    let sim = Sim::start(1);
+    let profile = sim.profile(|_| {});
+    let mut run = recording(&sim, &profile);
+    let since = SystemTime::now();
+    run.process.signal(signal);
+    stands(signal.as_str(), &sim, since, limit_s(&profile, 0.0));
+    assert!(sim.shafts().last().is_some_and(|shaft| !shaft.servo_on), "{signal}: servo off by its watchdog");
+    if signal == Signal::SIGSTOP {
+        // Thawed, it finds its lease run out, and does not take up what it was doing.
+        run.process.signal(Signal::SIGCONT);
+        let ended = run.wait(20.0);
+        assert_eq!(ended.code, Some(5), "{}", ended.stderr);
+        assert!(ended.stderr.contains("lease") || ended.stderr.contains("0x0020"), "{}", ended.stderr);
+        assert!(!sim.shafts().iter().rev().take(100).any(|shaft| shaft.turns()));
+        run.assert_whole();
     }
 }
 
 #[test]
-fn an_unplugged_device() {
-    for device in ["servo", "brake", "counter"] {
-        for fault in [Fault::Unplugged, Fault::Silent] {
-            let sim = Sim::start(2);
-            let mut cable = Cable::to(&sim.port(device));
-            let profile = sim.profile(|profile| {
-                let port = cable.path.display().to_string();
-                match device {
-                    "servo" => profile.servo.port = port,
-                    "brake" => profile.brake.port = port,
-                    _ => profile.counter.port = port,
-                }
-            });
-            let mut run = recording(&sim, &profile);
-            let since = SystemTime::now();
-            cable.set(fault);
-            // A silent brake is asked three times before it counts as lost.
-            let notice_s = if fault == Fault::Silent { 1.5 } else { 0.0 };
-            stands(&format!("{device} {fault:?}"), &sim, since, limit_s(&profile, notice_s));
-            assert_eq!(run.wait(30.0).code, Some(5));
-            assert!(sim.shafts().last().is_some_and(|shaft| !shaft.servo_on), "{device} {fault:?}: servo off");
-            cable.pull();
-        }
+fn a_killed_daemon() {
+    struck(Signal::SIGKILL);
+}
+
+#[test]
+fn a_frozen_daemon() {
+    struck(Signal::SIGSTOP);
+}
+
+/// A device whose plug is pulled, and one that falls silent.
+fn lost(device: &str) {
+    for fault in [Fault::Unplugged, Fault::Silent] {
+        let sim = Sim::start(2);
+        let mut cable = Cable::to(&sim.port(device));
+        let profile = sim.profile(|profile| {
+            let port = cable.path.display().to_string();
+            match device {
+                "servo" => profile.servo.port = port,
+                "brake" => profile.brake.port = port,
+                _ => profile.counter.port = port,
+            }
+        });
+        let mut run = recording(&sim, &profile);
+        let since = SystemTime::now();
+        cable.set(fault);
+        // A silent brake is asked three times before it counts as lost.
+        let notice_s = if fault == Fault::Silent { 1.5 } else { 0.0 };
+        stands(&format!("{device} {fault:?}"), &sim, since, limit_s(&profile, notice_s));
+        assert_eq!(run.wait(30.0).code, Some(5));
+        assert!(sim.shafts().last().is_some_and(|shaft| !shaft.servo_on), "{device} {fault:?}: servo off");
+        cable.pull();
     }
+}
+
+#[test]
+fn a_lost_servo() {
+    lost("servo");
+}
+
+#[test]
+fn a_lost_brake() {
+    lost("brake");
+}
+
+#[test]
+fn a_lost_counter() {
+    lost("counter");
 }
 
 #[test]
@@ -112,6 +134,35 @@ fn the_emergency_stop() {
     std::thread::sleep(Duration::from_millis(200));
     let next = Run::with_profile(&profile, &["--revs", "1", "--direction", "ccw"]).wait(60.0);
     assert_eq!(next.code, Some(0), "{}", next.stderr);
+}
+
+#[test]
+fn a_load_that_runs_over_its_limit_while_the_shaft_turns() {
+    let mut sim = Sim::start(7);
+    // Supervised at 11 N·m, a tenth over what set-points are refused by.
+    let profile = sim.profile(|profile| profile.limits.load_nm = 10.0);
+    let mut run = recording(&sim, &profile);
+    // 0.482 A make 10 N·m; 4 % more are 10.6 N·m.
+    sim.tell("overcurrent 1.04");
+    std::thread::sleep(Duration::from_secs(2));
+    assert!(!run.process.ended(), "under the limit it goes on");
+    sim.tell("overcurrent 1.3");
+    let ended = run.wait(20.0);
+    assert_eq!(ended.code, Some(5), "{}", ended.stderr);
+    assert!(ended.stderr.contains("load") && ended.stderr.contains("limits.load_nm, and a tenth"), "{}", ended.stderr);
+    let said = events(&run.log().expect("a log"));
+    assert!(said.iter().any(|(_, name, text)| name == "halt" && text.contains("limits.load_nm")), "{said:?}");
+    run.assert_whole();
+    // The order of the stop: the load stays on the shaft until it stands, then brake to 0, then servo off.
+    std::thread::sleep(Duration::from_millis(300));
+    let shafts = sim.shafts();
+    // Shafts that are wound up by the load spring back when it is let go: less than a thirtieth of the speed.
+    let last_turning = shafts.iter().rposition(|shaft| shaft.input_rpm.abs() > 1.0).expect("it turned");
+    let brake_off = shafts.iter().rposition(|shaft| shaft.brake_a > 0.05).expect("it was loaded");
+    let servo_off = shafts.iter().rposition(|shaft| shaft.servo_on).expect("it was on");
+    let at = |index: usize| shafts[index].unix_s - shafts[last_turning].unix_s;
+    println!("over its load: brake off {:.2} s, servo off {:.2} s after standstill", at(brake_off), at(servo_off));
+    assert!(last_turning < brake_off && brake_off < servo_off && servo_off + 1 < shafts.len());
 }
 
 #[test]

@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use nix::unistd::Pid;
 use serde_json::Value;
-use support::{Sim, rigd, wait_for};
+use support::{Sim, lives, rigd, wait_for};
 use tempfile::TempDir;
 
 const TOKEN: &str = "correct-horse-battery-staple";
@@ -160,6 +161,55 @@ fn a_stop_needs_the_token_and_stops_in_order() {
     assert_eq!(code, Some(4), "stopped by the operator, log finalised");
     assert!(!sim.servo().state().on);
     wait_for("the end on the page", 10.0, || (service.get("/api/status")["ended"] == true).then_some(()));
+}
+
+#[test]
+fn a_plan_is_started_paused_and_taken_up_again_by_whoever_has_the_token() {
+    let sim = Sim::start(6);
+    let home = with_token();
+    std::fs::create_dir(home.path().join("plans")).expect("a directory");
+    let plan = "rate_hz = 2000.0\n[[runs]]\ndirection = \"cw\"\nload_nm = 5.0\nspeed_rpm = 30.0\nrevolutions = 4\n";
+    std::fs::write(home.path().join("plans/night.toml"), plan).expect("a file");
+    let profile = sim.profile(|_| {}).display().to_string();
+    let arguments = "--out @/runs --control --token-file @/token --plans @/plans --profile";
+    let arguments: Vec<&str> = arguments.split(' ').chain([profile.as_str()]).collect();
+    let service = Service::started(&arguments, home);
+    let post = |path: &str, token: Option<&str>, body: &str| {
+        let (status, body) = service.ask("POST", path, token, body);
+        (status, serde_json::from_str::<Value>(&body).unwrap_or_default())
+    };
+    let start = r#"{"plan": "night.toml"}"#;
+    assert_eq!(service.get("/api/plans").to_string().matches("night.toml").count(), 1);
+    assert_eq!(post("/api/pause", Some(TOKEN), "").0, 409, "nothing runs");
+    assert_eq!(post("/api/start", None, start).0, 401);
+    assert!(!sim.shafts().iter().any(|shaft| shaft.servo_on), "nothing was started without the token");
+    let (status, told) = post("/api/start", Some(TOKEN), start);
+    assert_eq!((status, &told["started"]), (200, &"night.toml".into()), "{told}");
+    assert!(lives(Pid::from_raw(told["pid"].as_i64().expect("a number") as i32)));
+    assert_eq!(post("/api/start", Some(TOKEN), start).0, 409, "one at a time");
+
+    let phase = |wanted: &str| {
+        let status = service.get("/api/status");
+        (status["state"]["phase"] == wanted).then_some(status)
+    };
+    wait_for("the recording", 60.0, || phase("RECORD"));
+    assert_eq!(post("/api/pause", None, "").0, 401);
+    let (status, told) = post("/api/pause", Some(TOKEN), "");
+    assert_eq!((status, &told["pausing"]), (200, &1.into()), "{told}");
+    let journal = service.home.path().join("runs/night/journal.jsonl");
+    let paused =
+        || std::fs::read_to_string(&journal).is_ok_and(|text| text.contains("paused at the end of a revolution"));
+    wait_for("the pause", 10.0, || paused().then_some(()));
+    std::thread::sleep(Duration::from_millis(1500));
+    assert!(sim.shafts().iter().rev().take(100).all(|shaft| !shaft.turns() && !shaft.servo_on), "at rest and off");
+    assert_eq!(service.get("/api/status")["plan"]["exit_code"], Value::Null, "it waits");
+    assert_eq!(post("/api/pause", Some(TOKEN), "").0, 200, "and goes on");
+    let ended = wait_for("the end of the plan", 60.0, || {
+        Some(service.get("/api/status")["plan"].clone()).filter(|plan| !plan["exit_code"].is_null())
+    });
+    assert_eq!((&ended["plan"], &ended["exit_code"]), (&"night.toml".into(), &0.into()));
+    let done = std::fs::read_to_string(&journal).expect("its journal");
+    assert_eq!(done.matches("\"what\":\"finished\"").count(), 1, "{done}");
 }
 
 #[test]

@@ -134,6 +134,24 @@ fn a_split_log_is_the_log_that_was_not_split() {
 }
 
 #[test]
+fn a_head_that_is_longer_than_a_part_may_be_does_not_make_a_part_of_every_message() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("log.mcap");
+    let rotation = Rotation { bytes: Some(10_000), period: None };
+    let mut log = RotatingWriter::create(&path, common::options(), rotation, "long-headed").unwrap();
+    log.attach(1, "pair.toml", "application/toml", &[b'#'; 50_000]).unwrap();
+    for n in 0..2000 {
+        // Text that does not compress away: digits of a hash.
+        let text: String =
+            (0..8_u64).map(|k| format!("{:016x}", (n * 8 + k + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15))).collect();
+        log.event(n * 1_000_000, n * 1_000_000, Level::Info, "x", &text).unwrap();
+    }
+    let parts = log.paths().len();
+    log.finish().unwrap();
+    assert!((2..60).contains(&parts), "{parts} parts of 2000 messages");
+}
+
+#[test]
 fn a_part_that_is_missing_is_named_and_its_samples_are_losses() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("log.mcap");

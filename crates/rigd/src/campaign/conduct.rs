@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use async_trait::async_trait;
 use gearmodel::measure::RunFigures;
-use riglog::RunMetadata;
 use riglog::proto::Level;
+use riglog::{RunMetadata, part_path};
 
 use super::CampaignError;
 use super::estimate::{Estimate, time};
@@ -143,8 +143,13 @@ impl Conductor {
         let kind = if spec.kind == Kind::Measure { String::new() } else { format!("_{}", spec.kind.name()) };
         let stem = format!("{:04}{kind}_{}_{}Nm_{}rpm", run + 1, spec.direction, spec.load_nm, spec.speed_rpm);
         let names = (1..).map(|n| if n == 1 { format!("{stem}.mcap") } else { format!("{stem}_{n}.mcap") });
-        let free =
-            |name: &String| !self.directory.join(name).exists() && !self.directory.join(UNFINISHED).join(name).exists();
+        // A part may outlive the first file of its log, where somebody clears away old ones.
+        let taken: Vec<_> = [&self.directory, &self.directory.join(UNFINISHED)]
+            .into_iter()
+            .flat_map(|directory| std::fs::read_dir(directory).into_iter().flatten().flatten())
+            .filter_map(|entry| log_name(&entry.path()))
+            .collect();
+        let free = |name: &String| !taken.contains(name);
         let name = names.into_iter().find(free).unwrap_or(stem);
         self.directory.join(name)
     }
@@ -263,19 +268,36 @@ impl Attendant for Conductor {
     }
 }
 
-/// Moves a log beside the finished ones.
+/// The name that the journal has for the log that a file belongs to: that of the log's first part. `None` for other files.
+#[must_use]
+pub fn log_name(path: &Path) -> Option<String> {
+    path.extension().filter(|extension| *extension == "mcap")?;
+    Some(part_path(path, 1).file_name()?.to_string_lossy().into_owned())
+}
+
+/// Moves a log, with all its parts, beside the finished ones. A crash on the way leaves parts that the next start moves.
 ///
 /// # Errors
 /// [`CampaignError::Io`].
 pub fn put_aside(directory: &Path, log: &Path) -> Result<(), CampaignError> {
     let beside = directory.join(UNFINISHED);
-    let failed = |action| move |source| CampaignError::Io { path: log.into(), action, source };
-    std::fs::create_dir_all(&beside).map_err(failed("make a place for"))?;
-    let Some(name) = log.file_name() else { return Ok(()) };
-    match std::fs::rename(log, beside.join(name)) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        moved => moved.map_err(failed("put aside")),
+    let failed = |path: &Path, action| {
+        let path = path.to_owned();
+        move |source| CampaignError::Io { path, action, source }
+    };
+    std::fs::create_dir_all(&beside).map_err(failed(&beside, "make"))?;
+    let Some(wanted) = log_name(log) else { return Ok(()) };
+    for entry in std::fs::read_dir(directory).map_err(failed(directory, "list"))?.flatten() {
+        let part = entry.path();
+        if log_name(&part).as_ref() != Some(&wanted) {
+            continue;
+        }
+        match std::fs::rename(&part, beside.join(entry.file_name())) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            moved => moved.map_err(failed(&part, "put aside"))?,
+        }
     }
+    Ok(())
 }
 
 /// A finished run goes into the journal once its log is whole; any other log goes aside.

@@ -6,7 +6,7 @@ use gearmodel::Direction;
 use serde::{Deserialize, Serialize};
 
 use super::CampaignError;
-use crate::profile::Profile;
+use crate::profile::{Profile, SLOWEST_RPM};
 use crate::run::attend::Suspend;
 use crate::run::job::{Kind, RunSpec, Settle};
 use crate::run::limits::slip_power_w;
@@ -230,6 +230,17 @@ impl CampaignPlan {
         runs
     }
 
+    /// How many there are, without making them.
+    fn count(&self) -> usize {
+        let senses = |senses: &[Senses]| senses.iter().map(|senses| senses.list().len()).sum::<usize>();
+        let matrix = |matrix: &Matrix| {
+            senses(&matrix.directions).saturating_mul(matrix.loads_nm.len()).saturating_mul(matrix.speeds_rpm.len())
+        };
+        let single = |single: &Single| single.direction.list().len();
+        let counts = self.matrix.iter().map(matrix).chain(self.runs.iter().map(single));
+        counts.fold(0, usize::saturating_add)
+    }
+
     /// The reference's runs.
     #[must_use]
     pub fn reference_runs(&self) -> Vec<RunSpec> {
@@ -282,13 +293,15 @@ impl CampaignPlan {
     pub fn check(&self, profile: &Profile, path: &Path) -> Result<(), CampaignError> {
         let mut faults = Vec::new();
         self.check_values(profile, &mut faults);
-        let measurements = self.measurements();
-        if measurements.is_empty() {
+        let count = self.count();
+        if count == 0 {
             faults.push("there is no run in it; write [[runs]] or [[matrix]]".into());
         }
-        if measurements.len().saturating_mul(self.repeats as usize) > MOST_RUNS {
-            faults.push(format!("{} runs × repeats = {} are more than {MOST_RUNS}", measurements.len(), self.repeats));
+        if count.saturating_mul(self.repeats as usize) > MOST_RUNS {
+            faults.push(format!("{count} runs × repeats = {} are more than {MOST_RUNS}", self.repeats));
         }
+        // Three long lists multiply to more runs than there is memory for.
+        let measurements = if count > MOST_RUNS { Vec::new() } else { self.measurements() };
         let named = |what: &'static str, runs: Vec<RunSpec>| runs.into_iter().enumerate().map(move |run| (what, run));
         let all = named("warm_up", self.warm_up_runs())
             .chain(named("reference", self.reference_runs()))
@@ -337,10 +350,10 @@ impl Single {
 fn check_run(name: &str, run: &RunSpec, profile: &Profile, faults: &mut Vec<String>) {
     let (limits, rig) = (&profile.limits, &profile.name);
     let (load, speed) = (run.load_nm, run.speed_rpm);
-    if !(speed > 0.0 && speed <= limits.speed_rpm) {
+    if !(speed >= SLOWEST_RPM && speed <= limits.speed_rpm) {
         let limit = limits.speed_rpm;
         faults.push(format!(
-            "{name}: speed_rpm = {speed} must be over 0 and up to {limit} rpm (limits.speed_rpm in profile '{rig}')"
+            "{name}: speed_rpm = {speed} must be from {SLOWEST_RPM} to {limit} rpm (limits.speed_rpm in profile '{rig}')"
         ));
     }
     if !(load >= 0.0 && load <= limits.load_nm) {
@@ -393,7 +406,17 @@ mod tests {
         let text =
             "[[matrix]]\ndirections = [\"both\"]\nloads_nm = [5, 10, 15]\nspeeds_rpm = [5, 10]\nrevolutions = 2\n";
         let plan = CampaignPlan::parse(text, Path::new("x")).expect("a plan");
-        assert_eq!(plan.measurements().len(), 12);
+        assert_eq!((plan.measurements().len(), plan.count()), (12, 12));
+    }
+
+    #[test]
+    fn a_plan_of_more_runs_than_there_is_memory_for_is_refused_without_making_them() {
+        let list = |word: &str| vec![word; 5000].join(",");
+        let (senses, numbers) = (list("\"both\""), list("1.0"));
+        let text =
+            format!("[[matrix]]\ndirections=[{senses}]\nloads_nm=[{numbers}]\nspeeds_rpm=[{numbers}]\nrevolutions=1\n");
+        let said = faults(&text);
+        assert!(said.contains("250000000000 runs") && said.contains("10000"), "{said}");
     }
 
     #[test]
@@ -418,6 +441,15 @@ mod tests {
         assert!(
             faults("[[runs]]\ndirection=\"cw\"\nload_nm=nan\nspeed_rpm=1\nrevolutions=1").contains("load_nm = NaN")
         );
+    }
+
+    #[test]
+    fn a_speed_at_which_no_revolution_ends_is_refused() {
+        let at = |rpm: f64| format!("[[runs]]\ndirection=\"cw\"\nload_nm=1.0\nspeed_rpm={rpm}\nrevolutions=1");
+        let plan = CampaignPlan::parse(&at(0.01), Path::new("x")).expect("a plan");
+        plan.check(&Profile::simulated(), Path::new("x")).expect("slow");
+        assert!(faults(&at(0.0099)).contains("from 0.01 to 60 rpm"));
+        assert!(faults(&at(1e-300)).contains("from 0.01"), "of which no time can be computed");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! `rigd campaign`: many runs by a plan, taken up again where they ended.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use gearmodel::NominalModel;
@@ -10,7 +11,7 @@ use super::run::TimeScale;
 use super::simulator::Simulator;
 use super::{Exit, fail, print, stop};
 use crate::campaign::CampaignError;
-use crate::campaign::conduct::{Conductor, put_aside};
+use crate::campaign::conduct::{Conductor, log_name, put_aside};
 use crate::campaign::estimate::{Estimate, estimate, time};
 use crate::campaign::journal::Journal;
 use crate::campaign::plan::CampaignPlan;
@@ -201,15 +202,17 @@ fn dry_run(args: &Args, prepared: &Prepared) -> Exit {
 /// Finalises what a killed start left, and puts aside what is no finished run.
 fn clear_away(directory: &Path, journal: &Journal) -> Result<(), Exit> {
     super::run::recover(directory);
-    let logs = std::fs::read_dir(directory).map(|entries| entries.flatten().collect::<Vec<_>>()).unwrap_or_default();
-    for entry in logs {
-        let name = entry.file_name();
-        let is_log = Path::new(&name).extension().is_some_and(|extension| extension == "mcap");
-        let known = journal.finished.iter().any(|run| name == run.log.as_str());
-        if is_log && !known && !journal.is_empty() {
-            eprintln!("{} is of a run that was not finished: put aside", entry.path().display());
-            put_aside(directory, &entry.path()).map_err(|error| fail(Exit::Failed, &error))?;
-        }
+    if journal.is_empty() {
+        // No campaign was ever begun here: what lies here is somebody else's.
+        return Ok(());
+    }
+    let files = std::fs::read_dir(directory).map(|entries| entries.flatten().collect::<Vec<_>>()).unwrap_or_default();
+    // Each log once, however many parts it has.
+    let logs: BTreeSet<_> = files.iter().filter_map(|entry| log_name(&entry.path())).collect();
+    for log in logs.iter().filter(|log| !journal.finished.iter().any(|run| run.log == **log)) {
+        let log = directory.join(log);
+        eprintln!("{} is of a run that was not finished: put aside", log.display());
+        put_aside(directory, &log).map_err(|error| fail(Exit::Failed, &error))?;
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tokio::task::LocalSet;
 
 use super::{Exit, fail, print};
-use crate::doctor::{self, Grade, Report};
+use crate::doctor::{self, Consent, Grade, Report};
 use crate::profile::Profile;
 use crate::run::session::Links;
 use crate::run::stop::StopRequests;
@@ -20,6 +20,9 @@ pub struct Args {
     /// Consent to one slow turn without load: encoder senses and indices. Clear the rig first
     #[arg(long)]
     turn: bool,
+    /// Turn a servo that has no watchdog of its own; somebody must stay at the emergency stop
+    #[arg(long)]
+    accept_no_watchdog: bool,
     /// One JSON object instead of text
     #[arg(long)]
     json: bool,
@@ -40,7 +43,8 @@ pub fn main(args: &Args) -> Exit {
     let outcome = LocalSet::new().block_on(&runtime, async {
         let stop = StopRequests::listen().map_err(|error| format!("signals: {error}"))?;
         let links = if simulated { simulated_links()? } else { Links::default() };
-        Ok::<_, String>(doctor::examine(&profile, links, args.turn, &stop).await)
+        let consent = Consent { turn: args.turn, no_watchdog: args.accept_no_watchdog };
+        Ok::<_, String>(doctor::examine(&profile, links, consent, &stop).await)
     });
     match outcome {
         Ok(report) => show(args, &profile, &report),

@@ -3,6 +3,7 @@
 mod analyse;
 mod audit;
 mod blindtest;
+mod brake;
 mod calibrate;
 mod campaign;
 mod diagnose;
@@ -11,13 +12,17 @@ mod doctor;
 mod export;
 mod import;
 mod info;
+mod jog;
 mod model;
+mod on_rig;
 mod profile;
 mod prune;
+mod recorded;
 mod recover;
 mod replay;
 mod run;
 mod serve;
+mod set_up;
 mod sim;
 mod simulator;
 pub mod stop;
@@ -101,6 +106,10 @@ enum Command {
     Doctor(doctor::Args),
     /// Show what the rig is doing, over HTTP; with a token, control it
     Serve(serve::Args),
+    /// Turn slowly without load for set-up; needs consent (--turn)
+    Jog(jog::Args),
+    /// Hold a brake torque for set-up, the motor off
+    Brake(brake::Args),
     /// End a run from another terminal, as Ctrl-C does
     Stop(stop::Args),
 }
@@ -137,6 +146,8 @@ pub fn main() -> ExitCode {
         Command::Profile(args) => profile::main(&args),
         Command::Doctor(args) => doctor::main(&args),
         Command::Serve(args) => serve::main(&args),
+        Command::Jog(args) => jog::main(&args),
+        Command::Brake(args) => brake::main(&args),
         Command::Stop(args) => stop::main(&args),
     };
     ExitCode::from(exit as u8)

@@ -1,7 +1,6 @@
 //! `rigd replay`: recompute TE and backlash from logs.
 
-use std::path::PathBuf;
-
+use super::recorded::Recorded;
 use super::{Exit, fail, print};
 use crate::analysis::Analysis;
 use crate::replay;
@@ -10,15 +9,11 @@ use crate::summary::{Origin, Summary};
 /// Recompute TE and backlash from logs.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The logs, in their order
-    #[arg(required = true, value_name = "LOG")]
-    logs: Vec<PathBuf>,
+    #[command(flatten)]
+    recorded: Recorded,
     /// `1` for real time, `2` for twice that, `max` for as fast as it goes
     #[arg(long, default_value = "max", value_parser = speed)]
     speed: Speed,
-    /// The gear pair [default: the one in the first log]
-    #[arg(long, value_name = "FILE")]
-    pair: Option<PathBuf>,
     /// One JSON object on stdout, nothing else
     #[arg(long)]
     json: bool,
@@ -46,9 +41,9 @@ pub fn main(args: &Args) -> Exit {
 }
 
 fn run(args: &Args) -> Result<Exit, Box<dyn std::error::Error>> {
-    let (model, backend) = replay::model_for(&args.logs[0], args.pair.as_deref())?;
+    let (model, backend) = replay::model_for(&args.recorded.logs[0], args.recorded.pair.as_deref())?;
     let mut analysis = Analysis::new(model);
-    let mut replayed = replay::replay(&args.logs, &mut analysis, args.speed.0)?;
+    let mut replayed = replay::replay(&args.recorded.logs, &mut analysis, args.speed.0)?;
     if analysis.runs().is_empty() {
         replayed.incomplete.push("no recorded run: TE and backlash need a stretch of phase RECORD".into());
     }
@@ -56,7 +51,7 @@ fn run(args: &Args) -> Result<Exit, Box<dyn std::error::Error>> {
         &analysis,
         Origin {
             schema: "rigd.replay/1",
-            log: args.logs.iter().map(|path| path.display().to_string()).collect(),
+            log: args.recorded.logs.iter().map(|path| path.display().to_string()).collect(),
             backend,
             losses: replayed.losses,
             ended: "done".into(),

@@ -9,7 +9,7 @@ use super::directions::Directions;
 use super::simulator::Simulator;
 use super::{Exit, fail, print, stop};
 use crate::clock::Clock;
-use crate::profile::Profile;
+use crate::profile::{Profile, SLOWEST_RPM};
 use crate::quantity::{RATE, SPEED, TORQUE};
 use crate::run::Plan;
 use crate::run::attend::Policy;
@@ -124,6 +124,8 @@ enum Refusal {
         "--load {load_nm} N·m at --rpm {speed_rpm} makes {power_w:.0} W of heat in the brake, over its {limit_w} W (limits.slip_power_w in profile '{profile}'); lower load or speed"
     )]
     TooHot { load_nm: f64, speed_rpm: f64, power_w: f64, limit_w: f64, profile: String },
+    #[error("--rpm {speed_rpm} is too slow: a revolution would take hours; use {SLOWEST_RPM} rpm or more")]
+    TooSlow { speed_rpm: f64 },
     #[error("--rate {rate_hz} Hz does not fit the clock of a counter: use 10 Hz to 1 MHz")]
     Rate { rate_hz: f64 },
     #[error("--undocumented '{name}' is not an effect of the simulated rig; it has: {known}")]
@@ -243,6 +245,9 @@ fn refuse(profile: &Profile, plan: &Plan) -> Result<(), Refusal> {
         }
     };
     over("--rpm", plan.speed_rpm, "rpm", limits.speed_rpm, "limits.speed_rpm")?;
+    if plan.speed_rpm < SLOWEST_RPM {
+        return Err(Refusal::TooSlow { speed_rpm: plan.speed_rpm });
+    }
     for &load_nm in &plan.loads_nm {
         over("--load", load_nm, "N·m", limits.load_nm, "limits.load_nm")?;
         if profile.brake.current_a(load_nm).is_none() {

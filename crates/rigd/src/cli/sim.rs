@@ -27,8 +27,8 @@ pub struct Args {
     /// Write a table of the true shaft speeds, whatever encoders and drives say
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Take commands from standard input, a line each: `estop press`, `estop release`, `heat CELSIUS`, `no-watchdog`,
-    /// `counter restart`
+    /// Take commands from standard input, a line each: `estop press`, `estop release`, `heat CELSIUS`,
+    /// `overcurrent FACTOR`, `no-watchdog`, `counter restart`
     #[arg(long)]
     commands: bool,
     #[command(flatten)]

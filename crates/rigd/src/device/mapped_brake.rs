@@ -4,7 +4,8 @@ use async_trait::async_trait;
 
 use super::bus::BusStatistics;
 use super::map::{BrakeRules, Map, Mapped};
-use super::{Brake, BrakeStatus, DeviceError, Identity};
+use super::stand_in::StandIn;
+use super::{Brake, BrakeStatus, DeviceError, Identity, Part};
 use crate::link::{Address, Link};
 use crate::profile::BrakeProfile;
 
@@ -18,12 +19,12 @@ struct MappedBrake {
 pub fn open(link: Link, address: Address, profile: &BrakeProfile) -> Box<dyn Brake> {
     match Map::of_brake(profile) {
         Ok((map, rules)) => {
-            let bus = map.bus(link, address, profile.unit);
+            let bus = map.bus(link, address, profile.unit, profile.horizon());
             // The first model, whose currents are the smallest, until the device has said which it is.
             let model = map.models.first().cloned();
             Box::new(MappedBrake { device: Mapped { bus, map, model }, rules })
         }
-        Err(reason) => Box::new(Unmapped { reason }),
+        Err(reason) => Box::new(StandIn::unmapped(Part::Brake, reason)),
     }
 }
 
@@ -100,41 +101,5 @@ impl Brake for MappedBrake {
 
     fn statistics(&self) -> BusStatistics {
         self.device.bus.statistics()
-    }
-}
-
-/// A source whose map could not be read: says so to whatever is asked of it.
-struct Unmapped {
-    reason: String,
-}
-
-impl Unmapped {
-    fn refuse<T>(&self) -> Result<T, DeviceError> {
-        Err(DeviceError::Map { device: "brake", reason: self.reason.clone() })
-    }
-}
-
-#[async_trait(?Send)]
-impl Brake for Unmapped {
-    async fn identify(&mut self) -> Result<Identity, DeviceError> {
-        self.refuse()
-    }
-    fn max_current_a(&self) -> f64 {
-        0.0
-    }
-    async fn prepare(&mut self, _: f64) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn set_current_a(&mut self, _: f64) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn release(&mut self) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn status(&mut self) -> Result<BrakeStatus, DeviceError> {
-        self.refuse()
-    }
-    fn statistics(&self) -> BusStatistics {
-        BusStatistics::default()
     }
 }

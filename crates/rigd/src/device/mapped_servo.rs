@@ -6,7 +6,8 @@ use async_trait::async_trait;
 
 use super::bus::{BusError, BusStatistics};
 use super::map::{Map, Mapped, ServoRules, Step};
-use super::{DeviceError, Identity, Servo, ServoStatus};
+use super::stand_in::StandIn;
+use super::{DeviceError, Identity, Part, Servo, ServoStatus};
 use crate::link::{Address, Link};
 use crate::profile::ServoProfile;
 
@@ -24,10 +25,10 @@ struct MappedServo {
 pub fn open(link: Link, address: Address, profile: &ServoProfile) -> Box<dyn Servo> {
     match Map::of_servo(profile) {
         Ok((map, rules)) => {
-            let bus = map.bus(link, address, profile.unit);
+            let bus = map.bus(link, address, profile.unit, profile.horizon());
             Box::new(MappedServo { name: map.title.clone(), device: Mapped { bus, map, model: None }, rules })
         }
-        Err(reason) => Box::new(Unmapped { reason }),
+        Err(reason) => Box::new(StandIn::unmapped(Part::Servo, reason)),
     }
 }
 
@@ -199,42 +200,6 @@ impl Servo for MappedServo {
     }
 }
 
-/// A servo whose map could not be read: says so to whatever is asked of it.
-struct Unmapped {
-    reason: String,
-}
-
-impl Unmapped {
-    fn refuse<T>(&self) -> Result<T, DeviceError> {
-        Err(DeviceError::Map { device: "servo", reason: self.reason.clone() })
-    }
-}
-
-#[async_trait(?Send)]
-impl Servo for Unmapped {
-    async fn identify(&mut self) -> Result<Identity, DeviceError> {
-        self.refuse()
-    }
-    async fn prepare(&mut self, _: f64, _: f64, _: Duration) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn max_motor_rpm(&mut self) -> Result<f64, DeviceError> {
-        self.refuse()
-    }
-    async fn set_enabled(&mut self, _: bool) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn set_motor_rpm(&mut self, _: f64) -> Result<(), DeviceError> {
-        self.refuse()
-    }
-    async fn status(&mut self) -> Result<ServoStatus, DeviceError> {
-        self.refuse()
-    }
-    fn statistics(&self) -> BusStatistics {
-        BusStatistics::default()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::cell::RefCell;
@@ -245,6 +210,7 @@ mod tests {
     use wire::modbus::{ExceptionCode, Request, Response};
 
     use super::*;
+    use crate::device::bus::Horizon;
     use crate::profile::Profile;
     use crate::sim::emulator::Reply;
     use crate::sim::trial::{Device, Servo as EmulatedDrive, Workload, serve};
@@ -296,10 +262,14 @@ mod tests {
 
     /// Works with a driver of the map on such a drive.
     async fn with<T>(map: &str, drive: Keeping, work: impl AsyncFnOnce(&mut dyn Servo) -> T) -> T {
-        let (near, far) = tokio::io::duplex(1024);
         let profile = ServoProfile { driver: map.into(), unit: 1, ..Profile::simulated().servo };
+        with_profile(&profile, drive, work).await
+    }
+
+    async fn with_profile<T>(profile: &ServoProfile, drive: Keeping, work: impl AsyncFnOnce(&mut dyn Servo) -> T) -> T {
+        let (near, far) = tokio::io::duplex(1024);
         let address = Address { device: "servo", port: "x".into(), baud: 38_400, format: "8N2".into() };
-        let mut servo = open(Box::new(near), address, &profile);
+        let mut servo = open(Box::new(near), address, profile);
         let served = serve(far, drive);
         tokio::select! {
             () = served => panic!("the line is open"),
@@ -346,6 +316,21 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
+    async fn a_line_is_heard_for_as_long_as_the_profile_says_that_answers_are_late() {
+        let mut took = Vec::new();
+        for late_ms in [400.0, 900.0] {
+            let profile = ServoProfile { late_ms, ..Profile::simulated().servo };
+            let begun = tokio::time::Instant::now();
+            with_profile(&profile, Keeping::default(), async |servo| servo.max_motor_rpm().await.map(drop))
+                .await
+                .expect("it answers");
+            took.push(begun.elapsed().as_millis());
+        }
+        // A line just opened is heard for a whole horizon before the first request.
+        assert!((480..=520).contains(&(took[1] - took[0])), "{took:?} ms");
+    }
+
+    #[tokio::test(start_paused = true)]
     async fn torque_comes_with_its_sign_and_step() {
         let drive = Keeping::default();
         // −37 in two words, the low one first.
@@ -359,7 +344,7 @@ mod tests {
         let (map, rules) = Map::of_servo(&Profile::simulated().servo).expect("built in");
         let (link, _far) = tokio::io::duplex(16);
         let address = Address { device: "servo", port: "x".into(), baud: 38_400, format: "8N2".into() };
-        let device = Mapped { bus: map.bus(Box::new(link), address, 1), map, model: None };
+        let device = Mapped { bus: map.bus(Box::new(link), address, 1, Horizon::default()), map, model: None };
         let servo = MappedServo { device, rules, name: String::new() };
         assert!(servo.is_emergency_stop(ALARM_EMERGENCY_STOP) && !servo.is_emergency_stop(ALARM_COMMUNICATION_TIMEOUT));
     }

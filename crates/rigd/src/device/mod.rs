@@ -1,6 +1,5 @@
 //! Devices by what they do. One device is one file and one line in its list.
 
-pub mod absent;
 pub mod bus;
 pub mod counter_box;
 pub mod dsp7000;
@@ -8,6 +7,7 @@ pub mod map;
 pub mod mapped_brake;
 pub mod mapped_servo;
 pub mod refused;
+pub mod stand_in;
 pub mod two_clocks;
 
 use std::time::Duration;

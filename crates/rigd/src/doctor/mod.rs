@@ -11,7 +11,7 @@ use serde::Serialize;
 use tokio::time::{Instant, timeout};
 
 use crate::device::refused::{TE_ASKED_RAD, check_resolution};
-use crate::device::{self, Brake, Counter, Servo};
+use crate::device::{self, Brake, Counter, DeviceError, Servo};
 use crate::link::{Address, Link};
 use crate::profile::Profile;
 use crate::run::session::Links;
@@ -72,8 +72,17 @@ const RATE_HZ: f64 = 1000.0;
 /// How long the encoders are looked at, s.
 const LOOK_S: f64 = 0.5;
 
-/// Looks at a rig. `turn` is the operator's consent to one slow turn.
-pub async fn examine(profile: &Profile, links: Links, turn: bool, stop: &StopRequests) -> Report {
+/// What the operator consents to.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Consent {
+    /// One slow turn.
+    pub turn: bool,
+    /// A drive that has no watchdog of its own.
+    pub no_watchdog: bool,
+}
+
+/// Looks at a rig.
+pub async fn examine(profile: &Profile, links: Links, consent: Consent, stop: &StopRequests) -> Report {
     let mut report = Report::default();
     let (servo, brake, counter) = (&profile.servo, &profile.brake, &profile.counter);
     let at =
@@ -110,7 +119,7 @@ pub async fn examine(profile: &Profile, links: Links, turn: bool, stop: &StopReq
     };
     let mut fit = true;
     if let Some(servo) = &mut servo {
-        fit &= examine_servo(&mut report, servo.as_mut(), profile).await;
+        fit &= examine_servo(&mut report, servo.as_mut(), profile, consent.no_watchdog).await;
     }
     if let Some(brake) = &mut brake {
         fit &= examine_brake(&mut report, brake.as_mut(), profile).await;
@@ -119,9 +128,10 @@ pub async fn examine(profile: &Profile, links: Links, turn: bool, stop: &StopReq
     if let Some(counter) = &mut counter {
         counts_per_rev = examine_counter(&mut report, counter.as_mut()).await;
     }
-    match (turn, servo, brake, counter, counts_per_rev) {
+    match (consent.turn, servo, brake, counter, counts_per_rev) {
         (true, Some(mut servo), Some(mut brake), Some(mut counter), Some(counts)) if fit => {
-            turn::examine(&mut report, profile, servo.as_mut(), brake.as_mut(), counter.as_mut(), counts, stop).await;
+            let devices = turn::Devices { servo: servo.as_mut(), brake: brake.as_mut(), counter: counter.as_mut() };
+            turn::examine(&mut report, profile, devices, counts, consent.no_watchdog, stop).await;
         }
         (true, ..) => report.add(
             Grade::Fault,
@@ -153,7 +163,12 @@ async fn connect(report: &mut Report, link: Option<Link>, address: &Address) -> 
 }
 
 /// Identity, latency, speed limit, and the watchdog as it reads back. The motor stays off.
-async fn examine_servo(report: &mut Report, servo: &mut dyn Servo, profile: &Profile) -> bool {
+async fn examine_servo(
+    report: &mut Report,
+    servo: &mut dyn Servo,
+    profile: &Profile,
+    accept_no_watchdog: bool,
+) -> bool {
     match servo.identify().await {
         Ok(identity) => report.good("servo", identity.text),
         Err(error) => {
@@ -215,13 +230,19 @@ async fn examine_servo(report: &mut Report, servo: &mut dyn Servo, profile: &Pro
                 lease.as_secs_f64()
             ),
         ),
+        Err(error @ DeviceError::NoWatchdog { .. }) if accept_no_watchdog => report.add(
+            Grade::Warning,
+            "servo watchdog",
+            format!("ACCEPTED WITHOUT A WATCHDOG by --accept-no-watchdog: {error}"),
+            "stay at the emergency stop while it turns: nothing else ends the motion when this program dies",
+        ),
         Err(error) => {
             fit = false;
             report.add(
                 Grade::Fault,
                 "servo watchdog",
                 error.to_string(),
-                "a drive that has none turns on when this program dies: take one that has, or fit a hard-wired speed watch",
+                "a drive that has none turns on when this program dies: take one that has, or fit a hard-wired speed watch; --accept-no-watchdog turns it all the same",
             );
         }
     }

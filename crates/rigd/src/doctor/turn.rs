@@ -53,20 +53,33 @@ impl Seen {
     }
 }
 
+/// The whole rig takes part.
+pub struct Devices<'a> {
+    /// The servo drive.
+    pub servo: &'a mut dyn Servo,
+    /// The brake's driver.
+    pub brake: &'a mut dyn Brake,
+    /// The reader of the encoders.
+    pub counter: &'a mut dyn Counter,
+}
+
 /// Turns the driver slowly and looks at both encoders. The motor is off afterwards, whatever happened.
 pub async fn examine(
     report: &mut Report,
     profile: &Profile,
-    servo: &mut dyn Servo,
-    brake: &mut dyn Brake,
-    counter: &mut dyn Counter,
+    mut devices: Devices<'_>,
     counts_per_rev: [u64; 2],
+    accept_no_watchdog: bool,
     stop: &StopRequests,
 ) {
     let mut seen = Seen::default();
     let speed_rpm = TURN_RPM.min(profile.limits.speed_rpm);
-    let outcome = turn(profile, servo, brake, counter, counts_per_rev, stop, speed_rpm, &mut seen).await;
-    let off = switch_off(profile, servo, brake, counter, counts_per_rev, speed_rpm, &mut seen).await;
+    let armed = begin(profile, &mut devices, accept_no_watchdog).await;
+    let outcome = match armed {
+        Ok(()) => turn(profile, &mut devices, counts_per_rev, stop, speed_rpm, &mut seen).await,
+        Err(error) => Err(error),
+    };
+    let off = switch_off(profile, &mut devices, counts_per_rev, speed_rpm, &mut seen).await;
     if let Err(error) = outcome {
         report.add(Grade::Fault, "turn", error.to_string(), "remove the cause, then ask again");
     }
@@ -86,27 +99,32 @@ pub async fn examine(
     judge(report, profile, &seen, counts_per_rev);
 }
 
-#[expect(clippy::too_many_arguments, reason = "the whole rig takes part")]
+/// Starts the encoders and arms the drive's watchdog, or accepts that it has none.
+async fn begin(profile: &Profile, devices: &mut Devices<'_>, accept_no_watchdog: bool) -> Result<(), DeviceError> {
+    devices.counter.start(RATE_HZ).await?;
+    devices.brake.release().await?;
+    let lease = Duration::from_secs_f64(profile.sequence.lease_s);
+    match devices.servo.prepare(profile.servo.accel_ms, profile.servo.decel_ms, lease).await {
+        Err(DeviceError::NoWatchdog { .. }) if accept_no_watchdog => Ok(()),
+        armed => armed,
+    }
+}
+
 async fn turn(
     profile: &Profile,
-    servo: &mut dyn Servo,
-    brake: &mut dyn Brake,
-    counter: &mut dyn Counter,
+    devices: &mut Devices<'_>,
     counts_per_rev: [u64; 2],
     stop: &StopRequests,
     speed_rpm: f64,
     seen: &mut Seen,
 ) -> Result<(), DeviceError> {
-    counter.start(RATE_HZ).await?;
-    brake.release().await?;
-    let lease = Duration::from_secs_f64(profile.sequence.lease_s);
-    servo.prepare(profile.servo.accel_ms, profile.servo.decel_ms, lease).await?;
+    let servo = &mut *devices.servo;
     servo.set_motor_rpm(0.0).await?;
     servo.set_enabled(true).await?;
     servo.set_motor_rpm(speed_rpm * profile.servo.reduction * f64::from(profile.servo.sense)).await?;
     let end = Instant::now() + Duration::from_secs_f64(TURNS * 60.0 / speed_rpm + profile.servo.accel_ms * 1e-3);
     while Instant::now() < end && !stop.any() {
-        watch(profile, servo, counter, counts_per_rev[0], seen).await?;
+        watch(profile, devices, counts_per_rev[0], seen).await?;
         if seen.turned(counts_per_rev)[0].abs() >= TURNS {
             break;
         }
@@ -117,12 +135,11 @@ async fn turn(
 /// One poll: renews the lease and takes what the encoders sent.
 async fn watch(
     profile: &Profile,
-    servo: &mut dyn Servo,
-    counter: &mut dyn Counter,
+    devices: &mut Devices<'_>,
     counts_per_rev: u64,
     seen: &mut Seen,
 ) -> Result<(), DeviceError> {
-    let status = servo.status().await?;
+    let status = devices.servo.status().await?;
     if status.alarm != 0 {
         return Err(DeviceError::Alarm {
             port: profile.servo.port.clone(),
@@ -130,7 +147,7 @@ async fn watch(
         });
     }
     let until = Instant::now() + profile.poll_period();
-    while let Ok(batch) = timeout(until.saturating_duration_since(Instant::now()), counter.next()).await {
+    while let Ok(batch) = timeout(until.saturating_duration_since(Instant::now()), devices.counter.next()).await {
         seen.take(&batch?, counts_per_rev);
     }
     Ok(())
@@ -139,26 +156,24 @@ async fn watch(
 /// Speed 0, standstill by the encoders, motor off. Every step is tried whatever became of the one before.
 async fn switch_off(
     profile: &Profile,
-    servo: &mut dyn Servo,
-    brake: &mut dyn Brake,
-    counter: &mut dyn Counter,
+    devices: &mut Devices<'_>,
     counts_per_rev: [u64; 2],
     speed_rpm: f64,
     seen: &mut Seen,
 ) -> Result<bool, DeviceError> {
-    let stopped = servo.set_motor_rpm(0.0).await;
+    let stopped = devices.servo.set_motor_rpm(0.0).await;
     let ramp_s = 2.0 + profile.servo.decel_ms * 1e-3 * speed_rpm * profile.servo.reduction / 3000.0;
     let end = Instant::now() + Duration::from_secs_f64(ramp_s);
     let mut still = false;
     while !still && Instant::now() < end {
-        if watch(profile, servo, counter, counts_per_rev[0], seen).await.is_err() {
+        if watch(profile, devices, counts_per_rev[0], seen).await.is_err() {
             break;
         }
         still = seen.turns_a_second.abs() < STANDSTILL;
     }
-    let off = servo.set_enabled(false).await;
-    let released = brake.release().await;
-    if let Err(error) = counter.stop().await {
+    let off = devices.servo.set_enabled(false).await;
+    let released = devices.brake.release().await;
+    if let Err(error) = devices.counter.stop().await {
         tracing::warn!("{error}");
     }
     stopped.and(off).and(released).map(|()| still)

@@ -10,12 +10,17 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::calibration::{Calibration, CalibrationFileError};
+use crate::device::bus::Horizon;
+use lines::Fault;
 
 /// The embedded profile: emulated hardware in this process.
 pub const SIM_PROFILE: &str = include_str!("sim.toml");
 
 /// The embedded gear pair: the source document's, with its documented errors.
 pub const DEFAULT_PAIR: &str = include_str!("pair.toml");
+
+/// Slower than this nothing is turned, rpm of the driver: a revolution would take hours.
+pub const SLOWEST_RPM: f64 = 0.01;
 
 /// A rig's profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -71,6 +76,20 @@ pub struct ServoProfile {
     pub accel_ms: f64,
     /// Ramp from 3000 rpm of the motor to 0, ms.
     pub decel_ms: f64,
+    /// A late answer of its line may come until so long after its request, ms; more where a gateway holds answers back.
+    #[serde(default = "late_ms")]
+    pub late_ms: f64,
+    /// An answer may come once more until so long after it was taken, ms.
+    #[serde(default = "repeated_ms")]
+    pub repeated_ms: f64,
+}
+
+impl ServoProfile {
+    /// How long answers may come after they were due.
+    #[must_use]
+    pub fn horizon(&self) -> Horizon {
+        horizon(self.late_ms, self.repeated_ms)
+    }
 }
 
 /// The brake, its driver and its calibration.
@@ -100,6 +119,25 @@ pub struct BrakeProfile {
     pub rising: Vec<[f64; 2]>,
     /// Falling branch, likewise.
     pub falling: Vec<[f64; 2]>,
+    /// A late answer of its line may come until so long after its request, ms; more where a gateway holds answers back.
+    #[serde(default = "late_ms")]
+    pub late_ms: f64,
+    /// An answer may come once more until so long after it was taken, ms.
+    #[serde(default = "repeated_ms")]
+    pub repeated_ms: f64,
+}
+
+fn late_ms() -> f64 {
+    Horizon::default().late.as_secs_f64() * 1e3
+}
+
+fn repeated_ms() -> f64 {
+    Horizon::default().repeated.as_secs_f64() * 1e3
+}
+
+fn horizon(late_ms: f64, repeated_ms: f64) -> Horizon {
+    let time = |ms: f64| Duration::try_from_secs_f64(ms * 1e-3).unwrap_or_default();
+    Horizon { late: time(late_ms), repeated: time(repeated_ms) }
 }
 
 /// The counter box.
@@ -229,6 +267,14 @@ pub enum ProfileError {
         /// Line, key and reason.
         source: Box<toml::de::Error>,
     },
+    /// All that is wrong with it, as `rigd profile check` tells it.
+    #[error("profile {path}: {}", listed(.faults))]
+    Faults {
+        /// The file.
+        path: PathBuf,
+        /// Each with its line.
+        faults: Vec<Fault>,
+    },
     /// Its calibration.
     #[error(transparent)]
     Calibration(#[from] CalibrationFileError),
@@ -246,6 +292,11 @@ pub enum ProfileError {
     },
 }
 
+fn listed(faults: &[Fault]) -> String {
+    let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    lines.join("\n  ")
+}
+
 impl Profile {
     /// The embedded profile of the simulated rig.
     ///
@@ -257,12 +308,16 @@ impl Profile {
         Self::parse(SIM_PROFILE, Path::new("(embedded)")).expect("the embedded profile is valid")
     }
 
-    /// Reads and checks a profile.
+    /// Reads and checks a profile and what it names.
     ///
     /// # Errors
-    /// [`ProfileError`] names file, line, key, value and what is accepted.
+    /// [`ProfileError`] names the file and every fault in it with line, key, value and what is accepted.
     pub fn load(path: &Path) -> Result<Self, ProfileError> {
         let text = std::fs::read_to_string(path).map_err(|source| ProfileError::Read { path: path.into(), source })?;
+        let faults = check::faults(&text, path);
+        if !faults.is_empty() {
+            return Err(ProfileError::Faults { path: path.into(), faults });
+        }
         let mut profile = Self::parse(&text, path)?;
         if let Some(calibration) = profile.calibration.clone() {
             profile.calibrate(&path.parent().unwrap_or(Path::new("")).join(calibration))?;
@@ -296,28 +351,28 @@ impl Profile {
         let refuse = |key: &'static str, value: String, expected: String| {
             Err(ProfileError::Value { path: path.into(), key, value, expected })
         };
-        let positive = [
-            ("servo.reduction", self.servo.reduction),
-            ("servo.accel_ms", self.servo.accel_ms),
-            ("servo.decel_ms", self.servo.decel_ms),
-            ("brake.voltage_v", self.brake.voltage_v),
-            ("brake.current_limit_a", self.brake.current_limit_a),
-            ("brake.step_up", self.brake.step_up),
-            ("limits.speed_rpm", self.limits.speed_rpm),
-            ("limits.load_nm", self.limits.load_nm),
-            ("limits.slip_power_w", self.limits.slip_power_w),
-            ("limits.brake_temperature_c", self.limits.brake_temperature_c),
-            ("limits.te_excursion_mrad", self.limits.te_excursion_mrad),
-            ("limits.encoder_silence_ms", self.limits.encoder_silence_ms),
-            ("sequence.home_rpm", self.sequence.home_rpm),
-            ("sequence.settle_s", self.sequence.settle_s),
-            ("sequence.settle_turns", self.sequence.settle_turns),
-            ("sequence.load_s", self.sequence.load_s),
-            ("sequence.poll_ms", self.sequence.poll_ms),
-        ];
-        for (key, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return refuse(key, value.to_string(), "a finite number > 0".into());
+        // Wide enough for any rig, and narrow enough that no time computed from them is longer than a clock can hold.
+        for (key, value, least, most) in [
+            ("servo.reduction", self.servo.reduction, 1e-3, 1e5),
+            ("servo.accel_ms", self.servo.accel_ms, 1e-3, 1e6),
+            ("servo.decel_ms", self.servo.decel_ms, 1e-3, 1e6),
+            ("brake.voltage_v", self.brake.voltage_v, 1e-3, 1e4),
+            ("brake.current_limit_a", self.brake.current_limit_a, 1e-6, 1e3),
+            ("brake.step_up", self.brake.step_up, 1e-3, 1e4),
+            ("limits.speed_rpm", self.limits.speed_rpm, SLOWEST_RPM, 1e5),
+            ("limits.load_nm", self.limits.load_nm, 1e-6, 1e6),
+            ("limits.slip_power_w", self.limits.slip_power_w, 1e-6, 1e6),
+            ("limits.brake_temperature_c", self.limits.brake_temperature_c, 1.0, 1e3),
+            ("limits.te_excursion_mrad", self.limits.te_excursion_mrad, 1e-6, 1e4),
+            ("limits.encoder_silence_ms", self.limits.encoder_silence_ms, 1.0, 6e4),
+            ("sequence.home_rpm", self.sequence.home_rpm, SLOWEST_RPM, 1e5),
+            ("sequence.settle_s", self.sequence.settle_s, 1e-3, 3600.0),
+            ("sequence.settle_turns", self.sequence.settle_turns, 1e-3, 1e3),
+            ("sequence.load_s", self.sequence.load_s, 1e-3, 3600.0),
+            ("sequence.poll_ms", self.sequence.poll_ms, 1.0, 5e3),
+        ] {
+            if !(least..=most).contains(&value) {
+                return refuse(key, value.to_string(), format!("from {least} to {most}"));
             }
         }
         let lease = self.sequence.lease_s;
@@ -337,6 +392,17 @@ impl Profile {
         }
         if !(10..=1000).contains(&self.log.sync_ms) {
             return refuse("log.sync_ms", self.log.sync_ms.to_string(), "from 10 to 1000 ms".into());
+        }
+        for (keys, late_ms, repeated_ms) in [
+            (["servo.late_ms", "servo.repeated_ms"], self.servo.late_ms, self.servo.repeated_ms),
+            (["brake.late_ms", "brake.repeated_ms"], self.brake.late_ms, self.brake.repeated_ms),
+        ] {
+            if !(10.0..=5000.0).contains(&late_ms) {
+                return refuse(keys[0], late_ms.to_string(), "from 10 to 5000 ms".into());
+            }
+            if !(0.0..=late_ms).contains(&repeated_ms) {
+                return refuse(keys[1], repeated_ms.to_string(), format!("from 0 to late_ms = {late_ms}"));
+            }
         }
         for (key, value) in [
             ("counter.input_mounted_deg", self.counter.input_mounted_deg),
@@ -405,6 +471,12 @@ impl Profile {
 }
 
 impl BrakeProfile {
+    /// How long answers may come after they were due.
+    #[must_use]
+    pub fn horizon(&self) -> Horizon {
+        horizon(self.late_ms, self.repeated_ms)
+    }
+
     /// Coil current that loads the driven gear with `load_nm`, by the rising branch; `None` beyond its end.
     ///
     /// The brake turns `step_up` times as fast as the driven gear, so its torque is the load divided by it.

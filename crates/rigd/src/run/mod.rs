@@ -13,6 +13,7 @@ pub mod recorder;
 pub mod rig;
 pub mod sequence;
 pub mod session;
+pub mod set_up;
 pub mod settle;
 pub mod space;
 pub mod stop;

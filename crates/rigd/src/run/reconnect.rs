@@ -8,7 +8,7 @@ use tokio::time::{Instant, sleep};
 
 use super::halt::Halt;
 use super::rig::Rig;
-use crate::device::absent::Absent;
+use crate::device::stand_in::StandIn;
 use crate::device::{self, Brake, BusError, Counter, DeviceError, Part, Servo};
 use crate::link::{Address, Link};
 use crate::profile::Profile;
@@ -173,7 +173,7 @@ impl Rig {
                 let Err(error) = said else { return Ok(said?.text) };
                 if hung_up(&error) {
                     let (port, statistics) = (self.profile.brake.port.clone(), self.brake.statistics());
-                    self.brake = Box::new(Absent { part, port, statistics });
+                    self.brake = Box::new(StandIn::lost(part, port, statistics));
                     self.brake = self.dialer.brake(None).await?;
                     return Ok(self.brake.identify().await?.text);
                 }
@@ -193,7 +193,7 @@ impl Rig {
         let Err(error) = said else { return Ok(said?.text) };
         if hung_up(&error) {
             let (port, statistics) = (self.profile.servo.port.clone(), self.servo.statistics());
-            self.servo = Box::new(Absent { part: Part::Servo, port, statistics });
+            self.servo = Box::new(StandIn::lost(Part::Servo, port, statistics));
             self.servo = self.dialer.servo(None).await?;
             return Ok(self.servo.identify().await?.text);
         }

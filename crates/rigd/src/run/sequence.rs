@@ -56,6 +56,26 @@ fn heed_pause(rig: &Rig) -> Result<(), Halt> {
 /// # Errors
 /// [`Halt`], among them [`DeviceError::NoWatchdog`] for a drive that has none.
 pub async fn prepare(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
+    meet(rig, job).await?;
+    // Last, for the drive's watchdog runs from here on.
+    arm_watchdog(rig, job.accept_no_watchdog).await?;
+    rig.heard = tokio::time::Instant::now();
+    rig.set_speed(None, 0.0).await?;
+    rig.heed_stop()?;
+    let enabled = rig.servo.set_enabled(true).await;
+    // It may be on even where that could not be confirmed; a stop then takes the longer way.
+    rig.tell(Event::ServoOn);
+    rig.note(enabled)?;
+    // Switching on takes its time and asks the drive all along.
+    rig.heard = tokio::time::Instant::now();
+    await_samples(rig).await
+}
+
+/// Identifies the devices, starts the encoders and prepares the brake; the motor stays off.
+///
+/// # Errors
+/// [`Halt`].
+pub async fn meet(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
     rig.enter(Phase::Idle);
     let servo = rig.servo.identify().await;
     let servo = rig.note(servo)?;
@@ -80,18 +100,14 @@ pub async fn prepare(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
         event(rig, format!("servo {}; brake {}", servo.text, brake.text));
     }
     let prepared = rig.brake.prepare(rig.profile.brake.voltage_v).await;
-    rig.note(prepared)?;
-    // Last, for the drive's watchdog runs from here on.
-    arm_watchdog(rig, job.accept_no_watchdog).await?;
-    rig.heard = tokio::time::Instant::now();
-    rig.set_speed(None, 0.0).await?;
-    rig.heed_stop()?;
-    let enabled = rig.servo.set_enabled(true).await;
-    // It may be on even where that could not be confirmed; a stop then takes the longer way.
-    rig.tell(Event::ServoOn);
-    rig.note(enabled)?;
-    // Switching on takes its time and asks the drive all along.
-    rig.heard = tokio::time::Instant::now();
+    rig.note(prepared)
+}
+
+/// Until the encoders have sent something new.
+///
+/// # Errors
+/// [`Halt::TooLong`] when they do not.
+pub async fn await_samples(rig: &mut Rig) -> Result<(), Halt> {
     let before = rig.acquisition.borrow().samples();
     rig.until("the first encoder samples", 2.0, |acquisition| acquisition.samples() > before).await
 }

@@ -335,11 +335,16 @@ pub fn check_drivers(profile: &Profile) -> Result<(), UnknownDriver> {
 /// A log's path: start, senses, load and speed in its name; never one that exists.
 #[must_use]
 pub fn log_path(directory: &Path, plan: &Plan) -> PathBuf {
-    let time = jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ").to_string();
     let senses: Vec<_> = plan.directions.iter().map(ToString::to_string).collect();
     let loads: Vec<_> = plan.loads_nm.iter().map(|load| format!("{load}Nm")).collect();
     let loads = if loads.len() > 3 { format!("{}-{}", loads[0], loads[loads.len() - 1]) } else { loads.join("-") };
-    let stem = format!("{time}_{}_{loads}_{}rpm", senses.join("-"), plan.speed_rpm);
+    free_path(directory, &format!("{}_{loads}_{}rpm", senses.join("-"), plan.speed_rpm))
+}
+
+/// A log's path: start, and what is done, in its name; never one that exists.
+#[must_use]
+pub fn free_path(directory: &Path, what: &str) -> PathBuf {
+    let stem = format!("{}_{what}", jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ"));
     (0..)
         .map(|n| directory.join(if n == 0 { format!("{stem}.mcap") } else { format!("{stem}_{n}.mcap") }))
         .find(|path| !path.exists())

@@ -15,6 +15,8 @@ pub enum Command {
     EmergencyStop(bool),
     /// Make the brake's sensor show so much more, °C.
     Heat(f64),
+    /// Make the brake's source put out so many times what it is set to.
+    Overcurrent(f64),
     /// Make the drive one without a watchdog.
     NoWatchdog,
     /// Cut the counter box's power for an instant.
@@ -29,6 +31,9 @@ impl Command {
             ["estop", "press"] => Some(Self::EmergencyStop(true)),
             ["estop", "release"] => Some(Self::EmergencyStop(false)),
             ["heat", celsius] => celsius.parse().ok().filter(|value: &f64| value.is_finite()).map(Self::Heat),
+            ["overcurrent", factor] => {
+                factor.parse().ok().filter(|value: &f64| (0.0..=10.0).contains(value)).map(Self::Overcurrent)
+            }
             ["no-watchdog"] => Some(Self::NoWatchdog),
             ["counter", "restart"] => Some(Self::RestartCounter),
             _ => None,
@@ -40,6 +45,7 @@ impl Command {
         match self {
             Self::EmergencyStop(pressed) => world.press_emergency_stop(pressed),
             Self::Heat(by_c) => world.heat_brake_by(by_c),
+            Self::Overcurrent(factor) => world.run_brake_away(factor),
             Self::NoWatchdog => world.take_watchdog_away(),
             Self::RestartCounter => world.restart_counter(),
         }
@@ -59,7 +65,7 @@ pub fn listen(world: &Rc<RefCell<World>>) {
             match Command::parse(&line) {
                 Some(command) => command.perform(&mut world.borrow_mut()),
                 None => eprintln!(
-                    "'{line}' is no command; there are: estop press|release, heat CELSIUS, no-watchdog, counter restart"
+                    "'{line}' is no command; there are: estop press|release, heat CELSIUS, overcurrent FACTOR, no-watchdog, counter restart"
                 ),
             }
         }
@@ -74,7 +80,8 @@ mod tests {
     fn lines() {
         assert_eq!(Command::parse(" estop  press "), Some(Command::EmergencyStop(true)));
         assert_eq!(Command::parse("heat 80.5"), Some(Command::Heat(80.5)));
-        for wrong in ["", "estop", "heat much", "heat NaN", "counter"] {
+        assert_eq!(Command::parse("overcurrent 2"), Some(Command::Overcurrent(2.0)));
+        for wrong in ["", "estop", "heat much", "heat NaN", "overcurrent", "overcurrent -1", "counter"] {
             assert_eq!(Command::parse(wrong), None, "{wrong}");
         }
     }

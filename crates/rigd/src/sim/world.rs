@@ -120,6 +120,18 @@ impl World {
         self.brake.heat_by(by_c);
     }
 
+    /// Makes the brake's source put out `factor` times the current that it is set to.
+    pub fn run_brake_away(&mut self, factor: f64) {
+        self.advance();
+        self.brake.run_away(factor, &mut self.plant);
+    }
+
+    /// Makes the counter box send nothing at all, or speak again.
+    pub fn silence_counter(&mut self, silent: bool) {
+        self.advance();
+        self.counter.set_silent(silent);
+    }
+
     /// Makes the counter box begin anew, as after a cut of its power: stopped, counting from elsewhere.
     pub fn restart_counter(&mut self) {
         self.counter = CounterEmulator::new("SIM-0001", &self.plant);

@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test takes its part")]
 
 pub mod bench;
+pub mod desk;
 pub mod line;
 
 use std::fs::File;

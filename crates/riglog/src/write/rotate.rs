@@ -24,7 +24,7 @@ use crate::{
 /// When a log goes on in a new file. The default is never.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Rotation {
-    /// A part is ended at this size.
+    /// A part is ended at this size; what it repeats at its beginning does not count, or a long head would leave no room for samples.
     pub bytes: Option<u64>,
     /// A part is ended when its messages span this much log time.
     pub period: Option<Duration>,
@@ -46,8 +46,8 @@ pub struct RotatingWriter {
     rotation: Rotation,
     writer: LogWriter,
     part: u32,
-    /// Log time of the part's first message.
-    opened_ns: Option<u64>,
+    /// Log time of the part's first message, and the bytes before it.
+    opened: Option<(u64, u64)>,
     /// The part before, on its way to its end.
     ending: Option<JoinHandle<Result<LogStatistics, LogError>>>,
     finished: Vec<LogStatistics>,
@@ -88,7 +88,7 @@ impl RotatingWriter {
             rotation,
             writer,
             part: 1,
-            opened_ns: None,
+            opened: None,
             ending: None,
             finished: Vec::new(),
             head: Head::default(),
@@ -245,8 +245,9 @@ impl RotatingWriter {
     }
 
     fn rotate_if_due(&mut self, log_time_ns: u64) -> Result<(), LogError> {
-        let opened_ns = *self.opened_ns.get_or_insert(log_time_ns);
-        let large = self.rotation.bytes.is_some_and(|bytes| self.writer.bytes() >= bytes);
+        let written = self.writer.bytes();
+        let (opened_ns, head_bytes) = *self.opened.get_or_insert((log_time_ns, written));
+        let large = self.rotation.bytes.is_some_and(|bytes| written - head_bytes >= bytes);
         let age = Duration::from_nanos(log_time_ns.saturating_sub(opened_ns));
         let old = self.rotation.period.is_some_and(|period| age >= period);
         if large || old { self.rotate() } else { Ok(()) }
@@ -262,7 +263,7 @@ impl RotatingWriter {
         next.part(&PartMetadata { log_id: self.log_id.clone(), part, first_sample: self.next_sample })?;
         self.head.write(&mut next, self.writer.sequences())?;
         let mut done = std::mem::replace(&mut self.writer, next);
-        (self.part, self.opened_ns) = (part, None);
+        (self.part, self.opened) = (part, None);
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let end = move || {
             done.named_metadata(PartMetadata::CONTINUED, &MetadataMap::from([("next".to_owned(), name)]))?;

@@ -13,6 +13,7 @@ use riglog::{LogError, LogParts, RunSpan, RunStream, RunTotals, RunVisitor, Samp
 use thiserror::Error;
 
 use super::model::output::{Output, OutputError};
+use super::recorded::Recorded;
 use super::{Exit, fail};
 use crate::replay::{ReplayError, model_for};
 use figures::{Figures, Split};
@@ -20,12 +21,8 @@ use figures::{Figures, Split};
 /// Order spectra, long and short waves, averages and noise floor of logs.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The logs, in their order
-    #[arg(required = true, value_name = "LOG")]
-    logs: Vec<PathBuf>,
-    /// The gear pair [default: the one in the first log]
-    #[arg(long, value_name = "FILE")]
-    pair: Option<PathBuf>,
+    #[command(flatten)]
+    recorded: Recorded,
     /// Angle bins a turn
     #[arg(long, value_name = "N", default_value_t = 720)]
     bins: usize,
@@ -123,10 +120,10 @@ impl RunVisitor for Collector<'_> {
 fn run(args: &Args) -> Result<Exit, AnalyseError> {
     args.output.check(&[("--averages", args.averages.as_deref())])?;
     let grid = AngleGrid::new(args.bins)?;
-    let (model, _) = model_for(&args.logs[0], args.pair.as_deref())?;
+    let (model, _) = model_for(&args.recorded.logs[0], args.recorded.pair.as_deref())?;
     let mut collector = Collector { model: &model, grid, runs: Vec::new() };
     let mut incomplete = Vec::new();
-    for log in LogParts::group(&args.logs)? {
+    for log in LogParts::group(&args.recorded.logs)? {
         let path = log.first().to_owned();
         let totals = RunStream::open_parts(log)?.stream(&mut collector)?;
         if totals.losses_in_file > 0 {
@@ -146,7 +143,7 @@ fn run(args: &Args) -> Result<Exit, AnalyseError> {
     });
     let figures: Vec<Figures> =
         collector.runs.iter().map(|run| Figures::of(run, &model, args.highest, split)).collect();
-    let logs: Vec<String> = args.logs.iter().map(|path| path.display().to_string()).collect();
+    let logs: Vec<String> = args.recorded.logs.iter().map(|path| path.display().to_string()).collect();
     let report = forms::report(&logs, &figures, args.top, &incomplete);
     let extras = match &args.averages {
         Some(path) => vec![forms::averages(path, &collector.runs)?],

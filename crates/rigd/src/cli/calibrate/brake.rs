@@ -8,24 +8,20 @@ use gearmodel::calibration::{BrakePoint, COVERAGE, Stated, brake_curves};
 use gearmodel::{Direction, NominalModel};
 use riglog::RunMetadata;
 use serde_json::json;
-use tokio::task::LocalSet;
 
+use super::super::on_rig::{OnRig, on_rig};
 use super::super::{Exit, fail, stop};
 use super::{Output, date};
 use crate::calibration::{BrakeCalibration, Calibration};
-use crate::clock::Clock;
-use crate::profile::Profile;
+use crate::pair;
+use crate::profile::{Profile, SLOWEST_RPM};
 use crate::quantity::{SPEED, TORQUE};
 use crate::run::Plan;
 use crate::run::brake_sweep::{self, SweepPlan, Swept};
 use crate::run::halt::Halt;
 use crate::run::limits::slip_power_w;
-use crate::run::progress::Progress;
-use crate::run::recorder::Recorder;
 use crate::run::rig::Rig;
-use crate::run::session::{self, Frame, Links, LogHead, Outcome};
-use crate::run::stop::StopRequests;
-use crate::{pair, sim};
+use crate::run::session::{self, LogHead, Outcome};
 
 /// Sampling while the torque is what counts, Hz.
 const RATE_HZ: f64 = 1000.0;
@@ -137,8 +133,8 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
         let expected = format!("over 0 and at most brake.current_limit_a = {}", profile.brake.current_limit_a);
         refuse("--max-current", max_a, "A", expected)?;
     }
-    if !(args.rpm > 0.0 && args.rpm <= limits.speed_rpm) {
-        refuse("--rpm", args.rpm, "rpm", format!("over 0 and at most limits.speed_rpm = {}", limits.speed_rpm))?;
+    if !(SLOWEST_RPM..=limits.speed_rpm).contains(&args.rpm) {
+        refuse("--rpm", args.rpm, "rpm", format!("from {SLOWEST_RPM} to limits.speed_rpm = {}", limits.speed_rpm))?;
     }
     if !(0.0..=50.0).contains(&args.torque_uncertainty) {
         refuse("--torque-uncertainty", args.torque_uncertainty, "%", "from 0 to 50".into())?;
@@ -180,33 +176,15 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
 }
 
 fn execute(args: &Args, setup: Setup, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<Outcome, String> {
-    let simulated = setup.profile.in_process();
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(simulated).build();
-    let runtime = runtime.map_err(|error| error.to_string())?;
-    LocalSet::new().block_on(&runtime, async {
-        let stop = StopRequests::listen().map_err(|error| format!("signals: {error}"))?;
-        let links = if simulated {
-            let mut spec = sim::spec(&setup.model, &[]).map_err(|error| error.to_string())?;
-            sim::mount_discs(&mut spec, &setup.profile);
-            sim::start_in_process(&spec, RATE_HZ, args.seed).map_err(|error| error.to_string())?
-        } else {
-            Links::default()
-        };
-        let clock = if simulated { Clock::simulated() } else { Clock::real() };
-        let options = session::writer_options(&setup.profile);
-        let recorder = Recorder::create(&setup.path, options, &setup.profile.log).map_err(|error| error.to_string())?;
-        let conditions = RunMetadata {
-            direction: Direction::Ccw.to_string(),
-            speed_rpm: vec![plan.speed_rpm],
-            ..RunMetadata::default()
-        };
-        setup.head.describe(&recorder, &setup.profile, conditions, clock);
-        let Setup { profile, model, .. } = setup;
-        let progress = Progress::new(0.0, true);
-        let frame = Frame { profile, model, recorder, progress, links, clock, stop };
-        let sweep = async |rig: &mut Rig| brake_sweep::execute(rig, plan, swept).await;
-        Ok(session::with_rig(frame, async |rig| session::once(rig, sweep).await).await)
-    })
+    let Setup { path, profile, model, head } = setup;
+    let conditions = RunMetadata {
+        direction: Direction::Ccw.to_string(),
+        speed_rpm: vec![plan.speed_rpm],
+        ..RunMetadata::default()
+    };
+    let work = OnRig { path, profile, model, head, conditions, seed: args.seed, rate_hz: RATE_HZ, quiet: true };
+    let sweep = async |rig: &mut Rig| brake_sweep::execute(rig, plan, swept).await;
+    on_rig(work, async |rig| session::once(rig, sweep).await)
 }
 
 fn conclude(args: &Args, rig: &Profile, plan: &SweepPlan, mean_ratio: f64, swept: &Swept) -> Exit {

@@ -1,13 +1,12 @@
 //! `rigd calibrate zero`.
 
-use std::path::PathBuf;
-
 use gearmodel::Direction;
 use gearmodel::calibration::{COVERAGE, CalibrationError, Zero, zero};
 use gearmodel::measure::RunTe;
 use serde_json::json;
 
 use super::super::Exit;
+use super::super::recorded::Recorded;
 use super::{CalibrateError, Output, date, names, record};
 use crate::calibration::{Calibration, ZeroCalibration};
 use crate::present::arcsec;
@@ -16,20 +15,16 @@ use crate::replay::model_for;
 /// Where the indices stand against the gears' zero
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Logs with runs in both senses
-    #[arg(required = true, value_name = "LOG")]
-    logs: Vec<PathBuf>,
-    /// The gear pair with all that is known of it [default: the one in the first log]
-    #[arg(long, value_name = "FILE")]
-    pair: Option<PathBuf>,
+    #[command(flatten)]
+    recorded: Recorded,
     #[command(flatten)]
     output: Output,
 }
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, CalibrateError> {
-    let (model, rig) = model_for(&args.logs[0], args.pair.as_deref())?;
-    let recorded = record(&args.logs, &model.pair)?;
+    let (model, rig) = model_for(&args.recorded.logs[0], args.recorded.pair.as_deref())?;
+    let recorded = record(&args.recorded.logs, &model.pair)?;
     let mut best: Option<Zero> = None;
     for log in &recorded {
         for ccw in log.runs.iter().filter(|run| run.conditions().direction == Direction::Ccw) {

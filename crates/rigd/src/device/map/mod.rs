@@ -14,7 +14,7 @@ use serde::Deserialize;
 use thiserror::Error;
 use wire::register_map::{Access, RegisterDef, RegisterKind};
 
-use super::bus::{Bus, BusError, Manners, Span};
+use super::bus::{Bus, BusError, Horizon, Manners, Span};
 use crate::link::{Address, Link};
 use crate::profile::lines::Fault;
 use crate::profile::{BrakeProfile, ServoProfile};
@@ -431,7 +431,7 @@ impl Map {
 
     /// A master of the device's line.
     #[must_use]
-    pub fn bus(&self, link: Link, address: Address, unit: u8) -> Bus {
+    pub fn bus(&self, link: Link, address: Address, unit: u8, horizon: Horizon) -> Bus {
         let ms = |value: f64| Duration::from_secs_f64(value * 1e-3);
         let manners = Manners {
             silence: ms(self.line.silence_ms),
@@ -440,7 +440,7 @@ impl Map {
         };
         let spans: Vec<Span> =
             self.line.readable.iter().map(|[first, words]| Span { first: *first, words: *words }).collect();
-        Bus::new(link, address, unit, manners).with_spans(&spans)
+        Bus::new(link, address, unit, manners).with_spans(&spans).with_horizon(horizon)
     }
 
     /// An alarm's code and meaning.

@@ -35,14 +35,23 @@ pub struct BrakeEmulator {
     protection: Protection,
     writes: u64,
     heated_by_c: f64,
+    /// What it puts out over what it is set to; 1 in a sound one.
+    runaway: f64,
 }
 
 impl BrakeEmulator {
     /// A device of this model at this unit number, switched off.
     pub fn new(unit: u8, model: Model) -> Self {
         let map = Map::new(model);
-        let mut device =
-            Self { unit, map, registers: [0; REGISTERS], protection: Protection::None, writes: 0, heated_by_c: 0.0 };
+        let mut device = Self {
+            unit,
+            map,
+            registers: [0; REGISTERS],
+            protection: Protection::None,
+            writes: 0,
+            heated_by_c: 0.0,
+            runaway: 1.0,
+        };
         device.registers[usize::from(address::ID)] = model.id();
         device.registers[usize::from(address::SERIAL)] = (SERIAL >> 16) as u16;
         device.registers[usize::from(address::SERIAL) + 1] = SERIAL as u16;
@@ -78,6 +87,12 @@ impl BrakeEmulator {
     /// Makes its sensor show so much more than the coil has, °C.
     pub fn heat_by(&mut self, by_c: f64) {
         self.heated_by_c = by_c;
+    }
+
+    /// Makes it put out `factor` times the current that it is set to, as one does whose regulation has failed.
+    pub fn run_away(&mut self, factor: f64, coil: &mut dyn BrakeCoil) {
+        self.runaway = factor;
+        self.drive(coil);
     }
 
     /// Answers a request. The time does not matter to this device, which has no watchdog of its own.
@@ -199,7 +214,8 @@ impl BrakeEmulator {
     }
 
     fn drive(&self, coil: &mut dyn BrakeCoil) {
-        coil.set_drive(self.is_enabled(), self.value(&self.map.current_set), self.value(&self.map.voltage_set));
+        let current_a = self.value(&self.map.current_set) * self.runaway;
+        coil.set_drive(self.is_enabled(), current_a, self.value(&self.map.voltage_set));
     }
 }
 
@@ -255,6 +271,16 @@ mod tests {
         set(&mut device, &mut coil, address::ENABLE, 1);
         assert!(coil.enabled);
         assert_eq!(coil.limits, (0.425, 24.0));
+    }
+
+    #[test]
+    fn a_source_whose_regulation_fails_puts_out_more_than_it_says_it_is_set_to() {
+        let (mut device, mut coil) = (device(), Coil::default());
+        set(&mut device, &mut coil, address::CURRENT_SET, 300);
+        set(&mut device, &mut coil, address::ENABLE, 1);
+        device.run_away(2.0, &mut coil);
+        assert_eq!(coil.limits.0, 0.6);
+        assert_eq!(get(&mut device, &mut coil, address::CURRENT_SET, 1), [300]);
     }
 
     #[test]

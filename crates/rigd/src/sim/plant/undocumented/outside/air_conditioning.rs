@@ -1,7 +1,8 @@
 //! The room's temperature swings and turns the encoder's mount slowly to and fro.
 
 use super::super::{Dice, Parameters, PlantSpec, Undocumented};
-use crate::sim::plant::{Carrier, Oddity, Weight};
+use super::wave;
+use crate::sim::plant::{Carrier, Weight};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -25,12 +26,10 @@ fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {
-    spec.oddities.push(Oddity::Wave {
-        carrier: Carrier::Time,
-        order: 1.0 / parameters.number("period_s").max(1e-3),
-        amplitude_rad: parameters.number("a_rad"),
-        phase_rad: parameters.number("phase_rad"),
-        weight: Weight::Constant,
-        square: false,
-    });
+    spec.oddities.push(wave(
+        parameters,
+        Carrier::Time,
+        1.0 / parameters.number("period_s").max(1e-3),
+        Weight::Constant,
+    ));
 }

@@ -1,7 +1,8 @@
 //! A belt in the input encoder's drive goes round less often than the shaft: an order that is no whole number.
 
 use super::super::{Dice, Parameters, PlantSpec, Undocumented};
-use crate::sim::plant::{Carrier, Oddity, Weight};
+use super::wave;
+use crate::sim::plant::{Carrier, Weight};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -25,12 +26,5 @@ fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {
-    spec.oddities.push(Oddity::Wave {
-        carrier: Carrier::Input,
-        order: parameters.number("order"),
-        amplitude_rad: parameters.number("a_rad"),
-        phase_rad: parameters.number("phase_rad"),
-        weight: Weight::Constant,
-        square: false,
-    });
+    spec.oddities.push(wave(parameters, Carrier::Input, parameters.number("order"), Weight::Constant));
 }

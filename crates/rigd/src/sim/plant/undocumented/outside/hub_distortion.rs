@@ -1,7 +1,8 @@
 //! The hub of the output encoder is bolted in five places and gives way with the root of the load.
 
 use super::super::{Dice, Parameters, PlantSpec, Undocumented};
-use crate::sim::plant::{Carrier, Oddity, Weight};
+use super::wave;
+use crate::sim::plant::{Carrier, Weight};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -25,12 +26,5 @@ fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {
-    spec.oddities.push(Oddity::Wave {
-        carrier: Carrier::Output,
-        order: 5.0,
-        amplitude_rad: parameters.number("a_rad"),
-        phase_rad: parameters.number("phase_rad"),
-        weight: Weight::RootLoad,
-        square: false,
-    });
+    spec.oddities.push(wave(parameters, Carrier::Output, 5.0, Weight::RootLoad));
 }

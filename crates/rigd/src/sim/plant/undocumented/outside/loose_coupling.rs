@@ -1,7 +1,8 @@
 //! A loose coupling spreads with the square of the speed, four times a turn of the driver.
 
 use super::super::{Dice, Parameters, PlantSpec, Undocumented};
-use crate::sim::plant::{Carrier, Oddity, Weight};
+use super::wave;
+use crate::sim::plant::{Carrier, Weight};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -25,12 +26,5 @@ fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {
-    spec.oddities.push(Oddity::Wave {
-        carrier: Carrier::Input,
-        order: 4.0,
-        amplitude_rad: parameters.number("a_rad"),
-        phase_rad: parameters.number("phase_rad"),
-        weight: Weight::SpeedSquared,
-        square: false,
-    });
+    spec.oddities.push(wave(parameters, Carrier::Input, 4.0, Weight::SpeedSquared));
 }

@@ -1,6 +1,7 @@
 //! Effects that the diagnosis shall not know by name: what it must call unknown.
 
-use super::Undocumented;
+use super::{Parameters, Undocumented};
+use crate::sim::plant::{Carrier, Oddity, Weight};
 
 pub mod air_conditioning;
 pub mod belt_drive;
@@ -32,3 +33,15 @@ pub const OUTSIDE: &[Undocumented] = &[
     glitch_bursts::EFFECT,
     settling_seat::EFFECT,
 ];
+
+/// A wave of an effect's own size `a_rad` and phase `phase_rad`.
+fn wave(parameters: &Parameters, carrier: Carrier, order: f64, weight: Weight) -> Oddity {
+    Oddity::Wave {
+        carrier,
+        order,
+        amplitude_rad: parameters.number("a_rad"),
+        phase_rad: parameters.number("phase_rad"),
+        weight,
+        square: false,
+    }
+}

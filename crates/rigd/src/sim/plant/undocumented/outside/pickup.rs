@@ -1,7 +1,8 @@
 //! A cable picks up a tone: the reading swings at a fixed frequency, whatever the shaft does.
 
 use super::super::{Dice, Parameters, PlantSpec, Undocumented};
-use crate::sim::plant::{Carrier, Oddity, Weight};
+use super::wave;
+use crate::sim::plant::{Carrier, Weight};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -25,12 +26,5 @@ fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {
-    spec.oddities.push(Oddity::Wave {
-        carrier: Carrier::Time,
-        order: parameters.number("f_hz"),
-        amplitude_rad: parameters.number("a_rad"),
-        phase_rad: parameters.number("phase_rad"),
-        weight: Weight::Constant,
-        square: false,
-    });
+    spec.oddities.push(wave(parameters, Carrier::Time, parameters.number("f_hz"), Weight::Constant));
 }

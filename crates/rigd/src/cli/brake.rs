@@ -1,0 +1,70 @@
+//! `rigd brake`: hold a brake torque for set-up, the motor off.
+
+use std::cell::Cell;
+
+use riglog::RunMetadata;
+use serde_json::json;
+
+use super::set_up::{self, Common, Refusal, Task};
+use super::{Exit, fail};
+use crate::profile::Profile;
+use crate::quantity::TORQUE;
+use crate::run::rig::Rig;
+use crate::run::session;
+use crate::run::set_up::hold_brake;
+
+/// Hold a brake torque with the motor off, until Ctrl-C or for so many seconds, then set the brake to zero.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Load at the driven gear: 5Nm
+    #[arg(value_name = "TORQUE", value_parser = |text: &str| TORQUE.parse(text))]
+    load: f64,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Runs the command.
+pub fn main(args: &Args) -> Exit {
+    let profile = match set_up::load(&args.common) {
+        Ok(profile) => profile,
+        Err(error) => return fail(Exit::BadInput, error.as_ref()),
+    };
+    if let Err(refusal) = refuse(args.load, &profile) {
+        return fail(Exit::BadInput, &refusal);
+    }
+    let drag_nm = profile.brake.drag_nm();
+    if args.load < drag_nm {
+        eprintln!("warning: {} N·m is below the brake's drag of {drag_nm} N·m; the drag remains", args.load);
+    }
+    let heat_j = Cell::new(0.0);
+    let task = Task {
+        name: format!("brake_{}Nm", args.load),
+        opening: format!("the brake holds {} N·m for {} s at most; Ctrl-C ends it", args.load, args.common.seconds),
+        conditions: RunMetadata { load_nm: vec![args.load], ..RunMetadata::default() },
+        schema: "rigd.brake/1",
+        figures: &|| json!({"load_nm": args.load, "heat_j": heat_j.get()}),
+        words: &|| format!("{:.0} J above what the brake sheds are in its heat account", heat_j.get()),
+    };
+    set_up::conduct(&args.common, profile, &task, async |rig: &mut Rig| {
+        let hold = async |rig: &mut Rig| hold_brake(rig, args.load, args.common.seconds).await;
+        let outcome = session::once(rig, hold).await;
+        heat_j.set(rig.heat.heat_j());
+        outcome
+    })
+}
+
+fn refuse(load_nm: f64, profile: &Profile) -> Result<(), Refusal> {
+    let limit = profile.limits.load_nm;
+    if load_nm > limit {
+        return Err(Refusal::OverLimit {
+            what: "load",
+            value: load_nm,
+            limit,
+            unit: "N·m",
+            key: "limits.load_nm",
+            advice: ", or raise the limit if the rig allows it",
+        });
+    }
+    let limit_a = profile.brake.current_limit_a;
+    if profile.brake.current_a(load_nm).is_none() { Err(Refusal::BeyondBrake { load_nm, limit_a }) } else { Ok(()) }
+}
