@@ -344,7 +344,7 @@ fn longer_tips_keep_two_pairs_in_contact_for_longer_up_to_a_racks() {
     for pair in [elliptic(0.3287), circular((23, 47))] {
         let rig = rig(&pair);
         let mean_pairs = |reach: f64| {
-            let at: Vec<Station> = places(900).into_iter().map(|(theta, way)| station(&rig, theta, way)).collect();
+            let at: Vec<Station> = places(900).map(|(theta, way)| station(&rig, theta, way)).collect();
             at.iter().map(|at| rig.teeth_in_contact(at, reach).count()).sum::<usize>() as f64 / at.len() as f64
         };
         let ratios = [-0.5, 0.0, 0.5, 1.0].map(mean_pairs);
