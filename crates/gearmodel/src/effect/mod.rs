@@ -164,6 +164,11 @@ pub trait Effect: Sync {
         false
     }
 
+    /// Frequency at which it rings on by itself, Hz, where it does.
+    fn rings_hz(&self, _shape: &Shape, _found: &Estimate) -> Option<f64> {
+        None
+    }
+
     /// True where a shape is a list of times at which the level steps.
     fn steps(&self) -> bool {
         false

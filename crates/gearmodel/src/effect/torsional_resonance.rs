@@ -150,6 +150,14 @@ impl Effect for TorsionalResonance {
         true
     }
 
+    fn rings_hz(&self, shape: &Shape, found: &Estimate) -> Option<f64> {
+        match shape[..] {
+            // β = (f_shape/f)².
+            [ENCODER, f_hz, _] => Some(f_hz / found.beta[0].max(f64::MIN_POSITIVE).sqrt()),
+            _ => shape.get(1).copied(),
+        }
+    }
+
     fn grain(&self, shape: &Shape) -> Grain {
         // Orders of the turn are smooth, those of the mesh are not.
         if shape.first() == Some(&MESH) { Grain::Fine } else { Grain::Smooth }

@@ -40,6 +40,8 @@ const LARGE: f64 = 0.12;
 const SHARPENING_STEPS: [f64; 6] = [1.0, 0.6, 0.3, 0.15, 0.07, 0.03];
 /// What a moved shape must gain, nats: a fifth of its standard deviation.
 const SHARPER_NATS: f64 = 0.02;
+/// Most steps looked for between runs.
+const MOST_BETWEEN: usize = 4;
 /// Rounds of: search, look for events, sharpen shapes, estimate the noise anew.
 const ROUNDS: usize = 3;
 /// Log Bayes factor from which a sub-divisional error is taken off.
@@ -277,10 +279,14 @@ struct Aside {
 }
 
 impl Aside {
+    /// Mean square of the tones, rad².
+    fn tones_rad2(&self) -> f64 {
+        self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum()
+    }
+
     /// Its mean square, rad².
     fn mean_square_rad2(&self) -> f64 {
-        let tones: f64 = self.tones.iter().map(|tone| 0.5 * tone.amplitude_rad * tone.amplitude_rad).sum();
-        tones + self.knocks.map_or(0.0, |knocks| knocks.mean_square_rad2)
+        self.tones_rad2() + self.knocks.map_or(0.0, |knocks| knocks.mean_square_rad2)
     }
 
     fn is_empty(&self) -> bool {
@@ -516,11 +522,13 @@ impl<'a> Engine<'a> {
         causes.extend(found.patterns.into_iter().map(Cause::Unknown));
         let excluded = |effect: &dyn Effect| self.options.exclude.iter().any(|name| name == effect.name());
         if let Some((number, effect)) = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.steps() && !excluded(*e)) {
-            causes.extend(found.steps.into_iter().map(|times_s| {
+            let steps = |times_s: Vec<f64>| {
                 let [any, each] = events::STEPS_COST_NATS;
                 let cost_nats = any + each * times_s.len() as f64;
                 Cause::Effect { effect, number, shape: times_s, cost_nats }
-            }));
+            };
+            causes.extend(found.steps.into_iter().map(steps));
+            causes.extend(self.steps_between_runs().map(steps));
         }
         causes.retain(|cause| self.block_of(cause).is_none());
         let changed = !causes.is_empty();
@@ -530,6 +538,44 @@ impl<'a> Engine<'a> {
             }
         }
         changed
+    }
+
+    /// The steps of the best model and those between runs that take the place of levels of their own, if it has both.
+    fn steps_between_runs(&self) -> Option<Vec<f64>> {
+        let set = &self.best.as_ref()?.fit.set;
+        let mut times_s = set.iter().find_map(|b| match &self.pool.blocks[*b].cause {
+            Cause::Effect { effect, shape, .. } if effect.steps() && shape.len() > 1 => Some(shape.clone()),
+            _ => None,
+        })?;
+        let levels = |b: &usize| matches!(&self.pool.blocks[*b].cause, Cause::Unknown(Pattern::RunLevels { .. }));
+        if !set.iter().any(levels) {
+            return None;
+        }
+        let others: Vec<Cause> = self.steady_set().iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
+        let (number, effect) = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.steps())?;
+        let starts_s = self.grid.plan.starts_s.clone();
+        let mut before = f64::NEG_INFINITY;
+        for _ in 0..MOST_BETWEEN {
+            let mut few = self.pool.beside(&self.grid);
+            let set = few.add(&self.grid, self.rig, others.clone());
+            let with = |more: Option<&f64>| {
+                let mut shape: Vec<f64> = times_s.iter().chain(more).copied().collect();
+                shape.sort_by(f64::total_cmp);
+                Cause::Effect { effect, number, shape, cost_nats: 0.0 }
+            };
+            let tried: Vec<Cause> = std::iter::once(with(None)).chain(starts_s.iter().map(|t| with(Some(t)))).collect();
+            let tried = few.add(&self.grid, self.rig, tried);
+            let whitened = self.noise.whiten(&self.grid, &few);
+            let fit = evidence::fit(&few, &whitened, &set, &[])?;
+            let gains = evidence::scan(&few, &whitened, &fit, &tried);
+            let (best, gain) = tried.iter().zip(&gains).max_by(|a, b| a.1.total_cmp(b.1))?;
+            let Cause::Effect { shape, .. } = &few.blocks[*best].cause else { return None };
+            if *gain < before + events::STEPS_COST_NATS[1] || *shape == times_s {
+                break;
+            }
+            (before, times_s) = (*gain, shape.clone());
+        }
+        before.is_finite().then_some(times_s)
     }
 
     /// Looks for levels that settle in each run, swing or wander with time, and takes into the pool what is worth it.

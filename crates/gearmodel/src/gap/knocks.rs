@@ -40,6 +40,8 @@ pub struct Knocks {
     pub peak_rad: f64,
     /// Their mean square over the campaign's samples, rad².
     pub mean_square_rad2: f64,
+    /// Frequency at which they ring, Hz.
+    pub ring_hz: f64,
 }
 
 /// Finds knocks and cuts their points out of the runs; `None` where there are none.
@@ -62,6 +64,8 @@ pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
         return None;
     }
     let mut knocks = Knocks { count: found.len(), first_s: f64::INFINITY, ..Knocks::default() };
+    let sum = |of: fn(&Window) -> f64| found.iter().map(of).sum::<f64>();
+    knocks.ring_hz = 0.5 * sum(|w| w.crossings) / sum(|w| w.lasts_s).max(f64::MIN_POSITIVE);
     for window in &found {
         knocks.first_s = knocks.first_s.min(window.begin_s);
         knocks.peak_rad = knocks.peak_rad.max(window.peak_rad);
@@ -91,6 +95,9 @@ struct Window {
     peak_rad: f64,
     /// Weighted sum of squares.
     square_rad2: f64,
+    /// How long it lasts, s, and how often it changes sign.
+    lasts_s: f64,
+    crossings: f64,
 }
 
 /// Knocks outside what is cut already; `None` where cells do not come again often enough.
@@ -117,16 +124,17 @@ fn find(grid: &Grid, cut: &[bool]) -> Option<Vec<Window>> {
             let window = window(&even, &of_run, begin, QUIET * sigma_rad);
             at = window.end;
             let peak_rad = window.clone().map(|p| deviations[p].abs()).fold(0.0, f64::max);
-            // What is under way where the run begins and comes to rest from one side settles.
-            let settles = window.start < of_run.start + QUIET_PLACES
-                && window.len() > SETTLING
-                && one_sided(&deviations[window.clone()]);
+            // What is under way where the run begins and comes to rest from one side settles; what lasts to its end may be a step.
+            let at_an_end = window.start < of_run.start + QUIET_PLACES || window.end + QUIET_PLACES > of_run.end;
+            let settles = at_an_end && window.len() > SETTLING && one_sided(&deviations[window.clone()]);
             if settles || leaves_a_step(&deviations, &of_run, &window, peak_rad) {
                 continue;
             }
             found.push(Window {
                 begin_s: grid.places[begin].time_s,
                 peak_rad,
+                lasts_s: grid.places[window.end - 1].time_s - grid.places[window.start].time_s,
+                crossings: deviations[window.clone()].windows(2).filter(|d| d[0] * d[1] < 0.0).count() as f64,
                 square_rad2: window.clone().map(|p| grid.weight[p] * deviations[p] * deviations[p]).sum(),
                 places: window,
             });

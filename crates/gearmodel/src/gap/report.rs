@@ -28,6 +28,8 @@ const LINE_ODDS: f64 = 0.04;
 /// floor, the nominal and the noise model's.
 const INEXACT: f64 = 0.05;
 const INEXACT_OF_FLOOR: f64 = 0.08;
+/// Knocks ring at a resonance's own frequency where both are no further apart than a factor of e to this.
+const SAME_RING: f64 = 0.3;
 /// A wandering level under this part of the floor may be scatter.
 const WANDERS_OF_FLOOR: f64 = 0.3;
 
@@ -381,10 +383,17 @@ impl Engine<'_> {
                 Cause::Effect { .. } => known += size,
             }
         }
-        square += self.aside.mean_square_rad2();
+        // A resonance that was found rings whenever anything excites it; faster than the bins show, it cannot be told from knocks.
+        let slowest_hz = self.grid.plan.speeds_rad_per_s.first().map_or(0.0, |speed| speed / std::f64::consts::TAU);
+        let shown_hz = 0.5 * self.grid.bins as f64 * slowest_hz;
+        let own = |knocks: &&Knocks| {
+            self.rings_hz(best).any(|hz| hz > shown_hz || (knocks.ring_hz / hz).ln().abs() < SAME_RING)
+        };
+        let knocks = self.aside.knocks.as_ref().filter(|knocks| !own(knocks));
+        square += self.aside.tones_rad2() + knocks.map_or(0.0, |knocks| knocks.mean_square_rad2);
         let rms_rad = square.sqrt();
         let least_rad = least_rad(known.max(lines_rad2), floor_rad);
-        if let Some(knocks) = self.aside.knocks.filter(|knocks| knocks.mean_square_rad2.sqrt() > least_rad) {
+        if let Some(knocks) = knocks.filter(|knocks| knocks.mean_square_rad2.sqrt() > least_rad) {
             let description = format!(
                 "{} knocks or lost readings of up to {:.0} urad, the first at {:.2} s",
                 knocks.count,
@@ -409,6 +418,14 @@ impl Engine<'_> {
             .filter(|_| probability > 0.1)
             .map(|(_, pattern)| UnknownLocation { description: pattern.describe(), signature: pattern.signature() });
         Unknown { probability: probability.min(1.0), rms_rad, location }
+    }
+
+    /// Frequencies of the resonances in a model, Hz.
+    fn rings_hz(&self, model: &Model) -> impl Iterator<Item = f64> {
+        (0..model.fit.set.len()).filter_map(|n| match &self.pool.blocks[model.fit.set[n]].cause {
+            Cause::Effect { effect, shape, .. } => effect.rings_hz(shape, &self.raw(model, n)),
+            Cause::Unknown(_) => None,
+        })
     }
 
     /// Shares of the reducible gap: each effect's part of the whole fitted trace.
