@@ -31,7 +31,7 @@ const INEXACT_OF_FLOOR: f64 = 0.08;
 /// Knocks ring at a resonance's own frequency where both are no further apart than a factor of e to this.
 const SAME_RING: f64 = 0.3;
 /// A wandering level under this part of the floor may be scatter.
-const WANDERS_OF_FLOOR: f64 = 0.3;
+const WANDERS_OF_FLOOR: f64 = 0.8;
 
 /// Largest probability of what may be no more than that.
 const INEXACT_PROBABILITY: f64 = 0.02;
