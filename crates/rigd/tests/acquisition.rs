@@ -6,7 +6,7 @@ use gearmodel::Direction;
 use gearmodel::measure::RunConditions;
 use rigd::analysis::Analysis;
 use rigd::clock::Clock;
-use rigd::device::CounterIdentity;
+use rigd::device::{CounterIdentity, Zero};
 use rigd::profile::Profile;
 use rigd::run::acquire::Acquisition;
 use rigd::run::recorder::{Entry, Recorder};
@@ -71,8 +71,14 @@ fn record(
     let recorder = Recorder::create(&path, WriterOptions::new("test"), &Profile::simulated().log).expect("a log");
     recorder.write(0, 0, Entry::Attachment("pair.toml", "application/toml", pair_toml.into_bytes()));
     let mut acquisition = Acquisition::new(recorder, Clock::simulated(), Analysis::new(model.clone()));
-    let identity =
-        CounterIdentity { text: String::new(), counts_per_rev: [COUNTS; 2], lines: [18_000; 2], max_rate_hz: 1e6 };
+    let identity = CounterIdentity {
+        text: String::new(),
+        counts_per_rev: [COUNTS; 2],
+        lines: [18_000; 2],
+        max_rate_hz: 1e6,
+        own_rate: false,
+        zero: Zero::Index,
+    };
     acquisition.set_encoders(&identity, [1, 1], "none").expect("the first encoders");
     let mut source = Source {
         analysis: Analysis::new(model),
