@@ -31,6 +31,8 @@ const LONGEST_ACQUAINTANCE: Duration = Duration::from_secs(5);
 const REFIT: Duration = Duration::from_millis(500);
 /// A reader that is silent for so long while the other one speaks is lost.
 const SILENCE: Duration = Duration::from_millis(250);
+/// Lines of the output that are kept behind the last instant.
+const KEPT: usize = 64;
 /// The readers, as messages call them.
 const NAMES: [&str; 2] = ["input", "output"];
 
@@ -227,12 +229,13 @@ impl Qsb {
         let mut last: Option<(i64, [i64; 2])> = None;
         while let Some(&sample) = input.samples.front() {
             let at = (input_fit.host_s(sample.ticks as f64) - output_fit.offset_s) / output_fit.seconds_per_tick;
-            while output.samples.get(1).is_some_and(|next| next.ticks as f64 <= at) {
-                output.samples.pop_front();
-            }
-            let (Some(from), Some(to)) = (output.samples.front(), output.samples.get(1)) else { break };
+            let after = output.samples.partition_point(|next| next.ticks as f64 <= at);
+            let Some(&to) = output.samples.get(after) else { break };
+            let from = after.checked_sub(1).map_or(to, |before| output.samples[before]);
+            // A later fit may put an instant a little back.
+            output.samples.drain(..after.saturating_sub(KEPT));
             let part = (at - from.ticks as f64) / (to.ticks - from.ticks) as f64;
-            // Nothing is carried over a line that is missing, nor before the first one.
+            // Nothing is carried over a line that is missing, nor before the first one (which makes no part).
             let known = (0.0..1.0).contains(&part) && to.ticks - from.ticks == interval;
             let counts = [sample.count, from.count + ((to.count - from.count) as f64 * part).round() as i64];
             match last {

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use wire::qsb::register::COUNT;
 use wire::qsb::{Answer, Kind, Unwrap};
 
 use super::two_clocks::{ClockError, ClockFit};
@@ -113,12 +114,9 @@ impl Reader {
             }
             let line = std::mem::take(&mut self.line);
             match std::str::from_utf8(&line).ok().and_then(|text| Answer::parse(text).ok()) {
-                // A streamed line without its time is one that was cut.
-                Some(Answer { kind: Kind::Streamed, register: wire::qsb::register::COUNT, data, time_ticks }) => {
-                    match time_ticks {
-                        Some(ticks) => self.take(ticks, data, arrived_s)?,
-                        None => self.refused += 1,
-                    }
+                // A streamed line without its time is one that was cut, and refused below.
+                Some(Answer { kind: Kind::Streamed, register: COUNT, data, time_ticks: Some(ticks) }) => {
+                    self.take(ticks, data, arrived_s)?;
                 }
                 Some(answer) if answer.kind != Kind::Streamed => self.answers.push_back(answer),
                 _ => self.refused += 1,

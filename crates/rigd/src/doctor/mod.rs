@@ -95,6 +95,9 @@ pub async fn examine(profile: &Profile, links: Links, consent: Consent, stop: &S
     for address in &addresses {
         port::examine(&mut report, address);
     }
+    if let Some(qsb) = &counter.qsb {
+        port::examine(&mut report, &at("counter", &qsb.output_port, counter.baud, &counter.format));
+    }
     let [at_servo, at_brake, at_counter] = addresses;
     let mut servo = match (
         connect(&mut report, links.servo, &at_servo).await,

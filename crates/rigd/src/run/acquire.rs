@@ -1,5 +1,7 @@
 //! From the counter's batches to the log and to live TE: losses are counted, runs begin and end at exact samples.
 
+mod two_readers;
+
 use gearmodel::Direction;
 use gearmodel::measure::{AngleGrid, RunConditions};
 use riglog::proto::Level;
@@ -8,10 +10,11 @@ use riglog::{AngleScale, EncoderMetadata};
 use wire::counter_box::{SampleFlags, Samples};
 
 use super::recorder::{Entry, Recorder};
+use two_readers::TwoReaders;
+
 use crate::analysis::Analysis;
 use crate::clock::Clock;
-use crate::device::{Clocks, CounterIdentity, DeviceError, Zero};
-use crate::summary::TimeSkew;
+use crate::device::{CounterIdentity, DeviceError};
 
 /// An index that comes back further off than this part of a line is not the same index: counts were lost, or a disc has slipped.
 const INDEX_TOLERANCE_LINES: f64 = 0.25;
@@ -114,12 +117,8 @@ pub struct Acquisition {
     index_counts: [Option<i64>; 2],
     /// How far each disc is turned on its shaft, deg.
     mounted_deg: [f64; 2],
-    /// What the zero is taken from.
-    zero: Zero,
-    /// The clocks of two readers, latest.
-    clocks: Option<Clocks>,
-    /// What they were worth in TE at the runs so far.
-    skew: Option<TimeSkew>,
+    /// Zero and clocks of encoders that two readers read.
+    readers: TwoReaders,
     /// Last counts.
     counts: [i64; 2],
     /// What the rig is doing.
@@ -167,9 +166,7 @@ impl Acquisition {
             te_zero_rad: None,
             index_counts: [None; 2],
             mounted_deg: [0.0; 2],
-            zero: Zero::Index,
-            clocks: None,
-            skew: None,
+            readers: TwoReaders::default(),
             counts: [0; 2],
             status: Status::default(),
             latest: Latest::default(),
@@ -195,7 +192,7 @@ impl Acquisition {
                 expected: format!("{known:?}, as when the log was begun (begin a new one for other encoders)"),
             });
         }
-        self.zero = identity.zero;
+        self.readers.zero = identity.zero;
         self.encoders = EncoderMetadata {
             input_counts_per_rev: identity.counts_per_rev[0],
             output_counts_per_rev: identity.counts_per_rev[1],
@@ -385,69 +382,6 @@ impl Acquisition {
         self.counts_offset[which] += by;
         self.counts[which] += by;
         self.index_counts[which] = self.index_counts[which].map(|counts| counts + by);
-    }
-
-    /// Whether the encoders' zero is an index that has to be looked for.
-    #[must_use]
-    pub fn has_index(&self) -> bool {
-        self.zero == Zero::Index
-    }
-
-    /// Takes the zero of encoders that have no index: once. What has lost it since cannot find it again, and `false` says so.
-    #[must_use]
-    pub fn home_without_index(&mut self) -> bool {
-        if self.zero_written {
-            return self.homed;
-        }
-        let (zero, said) = match self.zero {
-            Zero::Counts(counts) => (counts, "the profile says (counter.qsb.zero_counts)"),
-            Zero::Begin | Zero::Index => (self.counts, "the run began"),
-        };
-        self.index_counts = zero.map(Some);
-        self.home();
-        let what = format!("these encoders have no index: both angles are zero at counts {zero:?}, where {said}");
-        self.event(Level::Warning, "zero", what);
-        true
-    }
-
-    /// What two readers' clocks are known to do now.
-    pub fn note_clocks(&mut self, clocks: Option<Clocks>) {
-        self.clocks = clocks.or(self.clocks);
-    }
-
-    /// What two readers' clocks were worth in TE, at the worst of the runs so far.
-    #[must_use]
-    pub fn time_skew(&self) -> Option<TimeSkew> {
-        self.skew
-    }
-
-    /// Books what two readers' clocks are worth in TE at a run, in metadata `rig.clocks` too.
-    fn book_clocks(&mut self) {
-        let Some(clocks) = self.clocks else { return };
-        let pair = &self.analysis.model().pair;
-        let grid = AngleGrid::default();
-        let steepest = (0..grid.bins()).map(|bin| pair.ratio(grid.centre(bin)).abs()).fold(0.0, f64::max);
-        let te_rad = clocks.skew.te_uncertainty_rad(self.status.speed_setpoint_rpm, steepest);
-        let worst = self.skew.map_or(0.0, |skew| skew.te_uncertainty_rad).max(te_rad);
-        let skew = TimeSkew {
-            uncertainty_s: clocks.skew.uncertainty_s,
-            te_uncertainty_rad: worst,
-            drift_ppm: clocks.drift_ppm,
-            refused_lines: clocks.refused,
-        };
-        self.skew = Some(skew);
-        let map = [
-            ("input_drift_ppm", clocks.drift_ppm[0].to_string()),
-            ("output_drift_ppm", clocks.drift_ppm[1].to_string()),
-            ("skew_uncertainty_s", clocks.skew.uncertainty_s.to_string()),
-            ("te_uncertainty_rad", worst.to_string()),
-            ("speed_rpm", self.status.speed_setpoint_rpm.to_string()),
-            ("input_refused_lines", clocks.refused[0].to_string()),
-            ("output_refused_lines", clocks.refused[1].to_string()),
-        ];
-        let map = map.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
-        let now = self.clock.now_ns();
-        self.recorder.write(now, now, Entry::Metadata("rig.clocks", map));
     }
 
     /// Records `revolutions` whole turns from the next bin edge on.
