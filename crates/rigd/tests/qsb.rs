@@ -3,6 +3,7 @@
 mod support;
 
 use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use riglog::{LogReader, Record};
@@ -12,6 +13,13 @@ use support::{Run, Sim, rigd};
 
 /// Drift between the emulated readers, ppm.
 const DRIFT_PPM: f64 = 40.0;
+
+/// One rig at a time: their clocks are judged by when lines arrive.
+static ALONE: Mutex<()> = Mutex::new(());
+
+fn alone() -> MutexGuard<'static, ()> {
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 fn sim(seed: u64) -> Sim {
     Sim::start_with(seed, &["--qsb", "--qsb-drift", "40", "--qsb-offset", "1.7"])
@@ -33,6 +41,7 @@ fn summary(text: &str) -> Value {
 
 #[test]
 fn te_is_the_counter_boxes_within_the_stated_uncertainty_and_the_drift_is_found() {
+    let _alone = alone();
     let sim = sim(1);
     let profile = sim.profile_of("qsb.toml", |_| {});
     let check = rigd(sim.directory.path()).args(["profile", "check"]).arg(&profile).output().expect("it runs");
@@ -81,6 +90,7 @@ fn te_is_the_counter_boxes_within_the_stated_uncertainty_and_the_drift_is_found(
 
 /// A run whose output reader hangs on a cable that gets a fault while it records.
 fn fault_in_the_middle(fault: Fault, needles: &[&str]) {
+    let _alone = alone();
     let sim = sim(2);
     let mut cable = Cable::to(&sim.port("output"));
     let port = cable.path.display().to_string();
@@ -114,6 +124,7 @@ fn one_reader_silent_stops_the_rig() {
 
 #[test]
 fn a_reader_that_lost_its_power_stops_the_rig() {
+    let _alone = alone();
     let mut sim = sim(3);
     let profile = sim.profile_of("qsb.toml", |_| {});
     let mut run = run(&profile, "20");
@@ -128,6 +139,7 @@ fn a_reader_that_lost_its_power_stops_the_rig() {
 
 #[test]
 fn damaged_lines_are_losses_and_no_te() {
+    let _alone = alone();
     let sim = sim(4);
     let cable = Cable::to(&sim.port("output"));
     let profile = sim.profile_of("qsb.toml", |profile| {
