@@ -164,7 +164,7 @@ async fn a_jump_of_te_is_kept_for_the_supervisor_whose_polls_are_rarer_than_batc
 #[test]
 fn a_zero_without_an_index_is_taken_once_and_not_found_again() {
     let (_, model) = pair::load(None).expect("the built-in pair");
-    let directory = tempfile::TempDir::new().expect("a temporary directory");
+    let directory = TempDir::new().expect("a temporary directory");
     let path = directory.path().join("run.mcap");
     let recorder = Recorder::create(&path, WriterOptions::new("test"), &Profile::simulated().log).expect("a log");
     let mut acquisition = Acquisition::new(recorder, Clock::simulated(), Analysis::new(model));
