@@ -41,10 +41,26 @@ pub struct Summary {
     /// What happened on the lines of servo and brake; empty for a replay.
     #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty")]
     pub lines: BTreeMap<&'static str, crate::device::bus::BusStatistics>,
+    /// What two readers' clocks are worth in TE; not of a counter box, nor of a replay, whose log has it as metadata `rig.clocks`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_skew: Option<TimeSkew>,
     /// How the run ended: `done`, or why not.
     pub ended: String,
     /// What one should know before believing the numbers.
     pub warnings: Vec<String>,
+}
+
+/// Two encoder readers have two clocks; what is not known of the time between them is an uncertainty of TE.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TimeSkew {
+    /// Standard uncertainty of the time between both readers, s.
+    pub uncertainty_s: f64,
+    /// What it is worth in TE at the steepest place and the fastest run, rad, one standard deviation.
+    pub te_uncertainty_rad: f64,
+    /// Drift of input and output reader against the host, parts per million.
+    pub drift_ppm: [f64; 2],
+    /// Lines of input and output reader that were not believed.
+    pub refused_lines: [u64; 2],
 }
 
 /// One run's conditions and TE.
@@ -225,6 +241,7 @@ impl Summary {
             backlashes,
             plot: None,
             lines: BTreeMap::new(),
+            time_skew: None,
             ended: origin.ended,
             warnings: origin.warnings,
         }
@@ -275,6 +292,16 @@ impl Summary {
             writeln!(out, "  measured against predicted: {} rms", angle(backlash.residual_rms_rad))?;
         }
         writeln!(out, "\nsamples {}   lost {}   recorded {:.1} s", self.samples, self.losses, self.duration_s)?;
+        if let Some(skew) = &self.time_skew {
+            let [input, output] = skew.drift_ppm;
+            writeln!(
+                out,
+                "clocks  two readers, known to {:.2} ms: TE ± {} (1σ); drift {input:.1} and {output:.1} ppm; {} lines refused",
+                skew.uncertainty_s * 1e3,
+                angle(skew.te_uncertainty_rad),
+                skew.refused_lines[0] + skew.refused_lines[1]
+            )?;
+        }
         for log in &self.log {
             writeln!(out, "log     {log}")?;
         }

@@ -6,7 +6,7 @@ use gearmodel::Direction;
 use gearmodel::measure::RunConditions;
 use rigd::analysis::Analysis;
 use rigd::clock::Clock;
-use rigd::device::CounterIdentity;
+use rigd::device::{CounterIdentity, Zero};
 use rigd::profile::Profile;
 use rigd::run::acquire::Acquisition;
 use rigd::run::recorder::{Entry, Recorder};
@@ -71,8 +71,14 @@ fn record(
     let recorder = Recorder::create(&path, WriterOptions::new("test"), &Profile::simulated().log).expect("a log");
     recorder.write(0, 0, Entry::Attachment("pair.toml", "application/toml", pair_toml.into_bytes()));
     let mut acquisition = Acquisition::new(recorder, Clock::simulated(), Analysis::new(model.clone()));
-    let identity =
-        CounterIdentity { text: String::new(), counts_per_rev: [COUNTS; 2], lines: [18_000; 2], max_rate_hz: 1e6 };
+    let identity = CounterIdentity {
+        text: String::new(),
+        counts_per_rev: [COUNTS; 2],
+        lines: [18_000; 2],
+        max_rate_hz: 1e6,
+        own_rate: false,
+        zero: Zero::Index,
+    };
     acquisition.set_encoders(&identity, [1, 1], "none").expect("the first encoders");
     let mut source = Source {
         analysis: Analysis::new(model),
@@ -153,4 +159,31 @@ async fn a_jump_of_te_is_kept_for_the_supervisor_whose_polls_are_rarer_than_batc
     });
     let expected = std::f64::consts::TAU / 100.0;
     assert!((excursion_rad - expected).abs() < MODEL_ERRORS_RAD, "{excursion_rad} against {expected}");
+}
+
+#[test]
+fn a_zero_without_an_index_is_taken_once_and_not_found_again() {
+    let (_, model) = pair::load(None).expect("the built-in pair");
+    let directory = TempDir::new().expect("a temporary directory");
+    let path = directory.path().join("run.mcap");
+    let recorder = Recorder::create(&path, WriterOptions::new("test"), &Profile::simulated().log).expect("a log");
+    let mut acquisition = Acquisition::new(recorder, Clock::simulated(), Analysis::new(model));
+    let zero = Zero::Counts([-1000, 2000]);
+    let identity = CounterIdentity {
+        text: String::new(),
+        counts_per_rev: [COUNTS; 2],
+        lines: [18_000; 2],
+        max_rate_hz: 512.0,
+        own_rate: true,
+        zero,
+    };
+    acquisition.set_encoders(&identity, [1, 1], "none").expect("the first encoders");
+    assert!(!acquisition.has_index());
+    assert!(acquisition.home_without_index(), "taken");
+    assert!(acquisition.home_without_index(), "still known: the stream went on");
+    acquisition.stream_lost();
+    assert!(!acquisition.home_without_index(), "nothing says where the counts begin now");
+    acquisition.into_parts().0.finish().expect("a log");
+    let info = riglog::info(&path).expect("a readable log");
+    assert_eq!(info.metadata["rig.encoders"]["input_index_counts"], "-1000");
 }

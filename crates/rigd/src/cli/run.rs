@@ -403,6 +403,7 @@ fn conclude(args: &Args, path: &Path, backend: String, warnings: Vec<String>, ou
     };
     let mut summary = Summary::of(&outcome.analysis, origin);
     summary.lines.clone_from(&outcome.lines);
+    summary.time_skew = outcome.time_skew;
     let picture = path.with_extension("svg");
     match plot::draw(&outcome.analysis, &picture) {
         Ok(true) => summary.plot = Some(picture.display().to_string()),

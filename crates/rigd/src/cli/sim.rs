@@ -28,9 +28,19 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Take commands from standard input, a line each: `estop press`, `estop release`, `heat CELSIUS`,
-    /// `overcurrent FACTOR`, `no-watchdog`, `counter restart`
+    /// `overcurrent FACTOR`, `no-watchdog`, `counter restart`,
+    /// `reader input restart`, `reader output restart`
     #[arg(long)]
     commands: bool,
+    /// Two QSB readers beside the counter box, on ports `input` and `output`; their profile is qsb.toml
+    #[arg(long)]
+    qsb: bool,
+    /// How much faster the output reader's clock goes than the input's, ppm
+    #[arg(long, value_name = "PPM", default_value_t = 40.0, allow_negative_numbers = true, requires = "qsb")]
+    qsb_drift: f64,
+    /// How far the output reader's clock is ahead of the input's, s
+    #[arg(long, value_name = "S", default_value_t = 1.7, allow_negative_numbers = true, requires = "qsb")]
+    qsb_offset: f64,
     #[command(flatten)]
     withhold: withhold::Args,
 }
@@ -56,7 +66,20 @@ pub fn main(args: &Args) -> Exit {
         Ok(runtime) => runtime,
         Err(error) => return fail(Exit::Failed, &error),
     };
-    let extras = sim::Extras { record: args.record.clone(), commands: args.commands };
+    for (option, value, most) in [("--qsb-drift", args.qsb_drift, 1e4), ("--qsb-offset", args.qsb_offset, 1e6)] {
+        if value.is_nan() || value.abs() > most || (option == "--qsb-offset" && value < 0.0) {
+            eprintln!(
+                "error: {option} {value} must be from {} to {most}",
+                if option == "--qsb-drift" { -most } else { 0.0 }
+            );
+            return Exit::BadInput;
+        }
+    }
+    let readers = args.qsb.then(|| {
+        let output = sim::emulator::QsbClock { offset_s: args.qsb_offset, fast_ppm: args.qsb_drift };
+        [sim::emulator::QsbClock::default(), output]
+    });
+    let extras = sim::Extras { record: args.record.clone(), commands: args.commands, readers };
     let outcome = LocalSet::new().block_on(&runtime, async {
         let stop = StopRequests::listen().map_err(|source| sim::SimError::Io { what: "signals".into(), source })?;
         sim::serve_ptys(&spec, args.seed, &args.pty_dir, &Profile::simulated(), &extras, stop).await

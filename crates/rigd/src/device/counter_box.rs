@@ -10,7 +10,7 @@ use wire::counter_box::{
     AckStatus, Command, Encoder, Frame, MAX_SAMPLES_PER_FRAME, PROTOCOL_VERSION, Samples, StreamDecoder,
 };
 
-use super::{Counter, CounterIdentity, DeviceError};
+use super::{Counter, CounterIdentity, DeviceError, Zero};
 use crate::link::{Address, Link};
 use crate::profile::CounterProfile;
 
@@ -145,6 +145,8 @@ impl Counter for CounterBox {
             counts_per_rev: [identity.input_counts_per_rev, identity.output_counts_per_rev],
             lines: [identity.input_lines, identity.output_lines],
             max_rate_hz: f64::from(identity.max_sample_rate_hz),
+            own_rate: false,
+            zero: Zero::Index,
         })
     }
 

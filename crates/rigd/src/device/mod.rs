@@ -6,6 +6,8 @@ pub mod dsp7000;
 pub mod map;
 pub mod mapped_brake;
 pub mod mapped_servo;
+pub mod qsb;
+pub mod qsb_reader;
 pub mod refused;
 pub mod stand_in;
 pub mod two_clocks;
@@ -94,6 +96,33 @@ pub struct CounterIdentity {
     pub lines: [u32; 2],
     /// Fastest sampling, Hz.
     pub max_rate_hz: f64,
+    /// It samples at [`CounterIdentity::max_rate_hz`] and no other rate.
+    pub own_rate: bool,
+    /// What its zero is.
+    pub zero: Zero,
+}
+
+/// What the zero of both angles is taken from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Zero {
+    /// The encoders' index pulses.
+    #[default]
+    Index,
+    /// Nothing marks it: it is where the run begins.
+    Begin,
+    /// Nothing marks it: it is where the profile says, counts since the readers were switched on.
+    Counts([i64; 2]),
+}
+
+/// What is known of the clocks of two readers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clocks {
+    /// Drift of input and output reader against the host, parts per million.
+    pub drift_ppm: [f64; 2],
+    /// How well their times are known against each other.
+    pub skew: two_clocks::Skew,
+    /// Lines that were not believed.
+    pub refused: [u64; 2],
 }
 
 /// Why a device failed.
@@ -263,6 +292,10 @@ pub trait Counter {
     async fn next(&mut self) -> Result<Samples, DeviceError>;
     /// Ends the stream.
     async fn stop(&mut self) -> Result<(), DeviceError>;
+    /// Its clocks, where there is more than one.
+    fn clocks(&self) -> Option<Clocks> {
+        None
+    }
 }
 
 /// Drivers by their name in the profile: each is opened on its link.
@@ -280,7 +313,8 @@ pub const BRAKES: Drivers<BrakeProfile, dyn Brake> =
     &[("rd60xx", mapped_brake::open), ("dsp7000", dsp7000::open), (MAP, mapped_brake::open)];
 
 /// Encoder readers by their name in the profile.
-pub const COUNTERS: Drivers<CounterProfile, dyn Counter> = &[("counter-box", counter_box::open)];
+pub const COUNTERS: Drivers<CounterProfile, dyn Counter> =
+    &[("counter-box", counter_box::open), (qsb::DRIVER, qsb::open)];
 
 /// A driver's name that is in no list.
 #[derive(Debug, Error)]

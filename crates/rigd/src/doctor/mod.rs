@@ -11,7 +11,7 @@ use serde::Serialize;
 use tokio::time::{Instant, timeout};
 
 use crate::device::refused::{TE_ASKED_RAD, check_resolution};
-use crate::device::{self, Brake, Counter, DeviceError, Servo};
+use crate::device::{self, Brake, Counter, DeviceError, Servo, Zero};
 use crate::link::{Address, Link};
 use crate::profile::Profile;
 use crate::run::session::Links;
@@ -94,6 +94,9 @@ pub async fn examine(profile: &Profile, links: Links, consent: Consent, stop: &S
     ];
     for address in &addresses {
         port::examine(&mut report, address);
+    }
+    if let Some(qsb) = &counter.qsb {
+        port::examine(&mut report, &at("counter", &qsb.output_port, counter.baud, &counter.format));
     }
     let [at_servo, at_brake, at_counter] = addresses;
     let mut servo = match (
@@ -365,6 +368,17 @@ async fn examine_counter(report: &mut Report, counter: &mut dyn Counter) -> Opti
         }
     };
     report.good("counter", identity.text.clone());
+    if identity.zero != Zero::Index {
+        report.add(
+            Grade::Warning,
+            "encoder zero",
+            match identity.zero {
+                Zero::Counts(counts) => format!("no index: both angles are zero at counts {counts:?}, by the profile, as long as no reader was switched off"),
+                Zero::Begin | Zero::Index => "no index: both angles are zero where the run begins".into(),
+            },
+            "put the pair at its zero before a run, or give counter.qsb.zero_counts; TE of non-circular gears is wrong with a wrong zero",
+        );
+    }
     match check_resolution(identity.counts_per_rev, TE_ASKED_RAD) {
         Ok(step) => report.good(
             "encoder resolution",
@@ -403,7 +417,10 @@ async fn examine_counter(report: &mut Report, counter: &mut dyn Counter) -> Opti
     if let Err(error) = counter.stop().await {
         report.add(Grade::Warning, "counter stop", error.to_string(), "switch the box off and on");
     }
-    let found = format!("{samples} samples in {LOOK_S} s at {RATE_HZ} Hz, {lost} lost");
+    let found = format!(
+        "{samples} samples in {LOOK_S} s at {} Hz, {lost} lost",
+        if identity.own_rate { identity.max_rate_hz } else { RATE_HZ }
+    );
     if samples == 0 || lost > 0 {
         report.add(
             Grade::Fault,

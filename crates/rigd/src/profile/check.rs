@@ -169,6 +169,9 @@ impl Check {
                 self.fault(section, "port", &format!("= {port:?} is also the {other}'s: give each device a line of its own (their speeds and silences differ, and one that hangs must not silence the other)"));
             }
         }
+        for (key, what) in super::qsb::faults(counter, &[&servo.port, &brake.port, &counter.port]) {
+            self.fault("counter", key, &what);
+        }
         for (section, unit) in [("servo", servo.unit), ("brake", brake.unit)] {
             if !(1..=247).contains(&unit) {
                 self.fault(

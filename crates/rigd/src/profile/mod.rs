@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod lines;
+pub mod qsb;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -166,6 +167,9 @@ pub struct CounterProfile {
     /// Likewise the output encoder's.
     #[serde(default)]
     pub output_mounted_deg: f64,
+    /// Two readers, with driver `qsb`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub qsb: Option<qsb::QsbProfile>,
 }
 
 /// Limits, refused before motion and supervised during it.

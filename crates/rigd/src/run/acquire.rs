@@ -1,5 +1,7 @@
 //! From the counter's batches to the log and to live TE: losses are counted, runs begin and end at exact samples.
 
+mod two_readers;
+
 use gearmodel::Direction;
 use gearmodel::measure::{AngleGrid, RunConditions};
 use riglog::proto::Level;
@@ -8,6 +10,8 @@ use riglog::{AngleScale, EncoderMetadata};
 use wire::counter_box::{SampleFlags, Samples};
 
 use super::recorder::{Entry, Recorder};
+use two_readers::TwoReaders;
+
 use crate::analysis::Analysis;
 use crate::clock::Clock;
 use crate::device::{CounterIdentity, DeviceError};
@@ -113,6 +117,8 @@ pub struct Acquisition {
     index_counts: [Option<i64>; 2],
     /// How far each disc is turned on its shaft, deg.
     mounted_deg: [f64; 2],
+    /// Zero and clocks of encoders that two readers read.
+    readers: TwoReaders,
     /// Last counts.
     counts: [i64; 2],
     /// What the rig is doing.
@@ -160,6 +166,7 @@ impl Acquisition {
             te_zero_rad: None,
             index_counts: [None; 2],
             mounted_deg: [0.0; 2],
+            readers: TwoReaders::default(),
             counts: [0; 2],
             status: Status::default(),
             latest: Latest::default(),
@@ -185,6 +192,7 @@ impl Acquisition {
                 expected: format!("{known:?}, as when the log was begun (begin a new one for other encoders)"),
             });
         }
+        self.readers.zero = identity.zero;
         self.encoders = EncoderMetadata {
             input_counts_per_rev: identity.counts_per_rev[0],
             output_counts_per_rev: identity.counts_per_rev[1],
@@ -627,6 +635,7 @@ impl Acquisition {
         self.recording = Recording::Done { revolutions: (extent_rad / std::f64::consts::TAU).round() };
         self.status.phase = Phase::Approach;
         self.write_state_at(arrived, end_ns, end_sample);
+        self.book_clocks();
         let lost = self.lost - lost_before;
         self.recorded_samples += end_sample - first_sample - lost;
         let duration_s = (end_ns - began_ns) as f64 * 1e-9;

@@ -119,6 +119,14 @@ pub enum Halt {
         /// How far the driver turned.
         turns: f64,
     },
+    /// Readers without an index were lost, and with them the zero.
+    #[error(
+        "counter on {port}: its readers have no index, and since the zero was taken their stream was lost, so that the angles cannot be found again: put the pair at its zero (or measure counter.qsb.zero_counts anew) and begin a new run"
+    )]
+    ZeroLost {
+        /// The counter's port.
+        port: String,
+    },
     /// Something took too long.
     #[error(
         "{what} took longer than {seconds:.0} s (now {now}); is the shaft blocked, or a limit of the drive too low?"

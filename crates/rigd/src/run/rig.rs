@@ -129,7 +129,11 @@ impl Rig {
                 tokio::select! {
                     biased;
                     batch = counter.next() => match batch {
-                        Ok(batch) => acquisition.borrow_mut().take(&batch),
+                        Ok(batch) => {
+                            let mut acquisition = acquisition.borrow_mut();
+                            acquisition.note_clocks(counter.clocks());
+                            acquisition.take(&batch);
+                        }
                         Err(error) => {
                             *failed.borrow_mut() = Some(error);
                             return;

@@ -166,6 +166,11 @@ async fn refuse_over_limit(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
 
 fn refuse_rate(rig: &Rig, encoders: &CounterIdentity, rate_hz: f64) -> Result<(), Halt> {
     let counter = &rig.profile.counter;
+    if encoders.own_rate {
+        let what = format!("the encoders are sampled at {} Hz, their readers' own rate", encoders.max_rate_hz);
+        rig.acquisition.borrow().event(Level::Info, "rate", what);
+        return Ok(());
+    }
     within("counter", &counter.port, "sample rate", rate_hz, encoders.max_rate_hz, "Hz")?;
     // A serial line carries a tenth of its baud rate in bytes; sockets and pipes have no such bound.
     if counter.port.starts_with('/') {
@@ -178,6 +183,11 @@ fn refuse_rate(rig: &Rig, encoders: &CounterIdentity, rate_hz: f64) -> Result<()
 /// Turns ccw without load until both indices have passed; they are the zero of both angles.
 async fn home(rig: &mut Rig) -> Result<(), Halt> {
     rig.enter(Phase::Homing);
+    let indexed = rig.acquisition.borrow().has_index();
+    if !indexed {
+        let homed = rig.acquisition.borrow_mut().home_without_index();
+        return if homed { Ok(()) } else { Err(Halt::ZeroLost { port: rig.profile.counter.port.clone() }) };
+    }
     let speed = rig.profile.sequence.home_rpm;
     rig.set_load(0.0).await?;
     rig.acquisition.borrow_mut().forget_index();

@@ -72,6 +72,8 @@ pub struct Outcome {
     pub finalised: bool,
     /// What happened on each device's line.
     pub lines: BTreeMap<&'static str, BusStatistics>,
+    /// What two readers' clocks are worth in TE.
+    pub time_skew: Option<crate::summary::TimeSkew>,
 }
 
 /// The links to the three devices; `None` where the profile's port is to be opened.
@@ -192,6 +194,7 @@ pub async fn with_rig(frame: Frame, body: impl AsyncFnOnce(&mut Rig) -> (Option<
     let Some(acquisition) = Rc::into_inner(acquisition) else { unreachable!("the rig and its tasks are gone") };
     let acquisition = acquisition.into_inner();
     let lost = acquisition.lost();
+    let time_skew = acquisition.time_skew();
     let (recorder, analysis) = acquisition.into_parts();
     let late_failure = recorder.take_failure();
     let unwritten = recorder.unwritten();
@@ -205,7 +208,7 @@ pub async fn with_rig(frame: Frame, body: impl AsyncFnOnce(&mut Rig) -> (Option<
             troubles.push(format!("the log could not be finalised: {error}"));
         }
     }
-    Outcome { analysis, halt, troubles, lost, unwritten, finalised, lines }
+    Outcome { analysis, halt, troubles, lost, unwritten, finalised, lines, time_skew }
 }
 
 /// Does some work on the rig once, and switches off whatever came of it, a panic too.

@@ -21,6 +21,8 @@ pub enum Command {
     NoWatchdog,
     /// Cut the counter box's power for an instant.
     RestartCounter,
+    /// Cut the power of a QSB reader for an instant: 0 input, 1 output.
+    RestartReader(usize),
 }
 
 impl Command {
@@ -36,6 +38,8 @@ impl Command {
             }
             ["no-watchdog"] => Some(Self::NoWatchdog),
             ["counter", "restart"] => Some(Self::RestartCounter),
+            ["reader", "input", "restart"] => Some(Self::RestartReader(0)),
+            ["reader", "output", "restart"] => Some(Self::RestartReader(1)),
             _ => None,
         }
     }
@@ -48,6 +52,7 @@ impl Command {
             Self::Overcurrent(factor) => world.run_brake_away(factor),
             Self::NoWatchdog => world.take_watchdog_away(),
             Self::RestartCounter => world.restart_counter(),
+            Self::RestartReader(which) => world.restart_reader(which),
         }
     }
 }
@@ -65,7 +70,7 @@ pub fn listen(world: &Rc<RefCell<World>>) {
             match Command::parse(&line) {
                 Some(command) => command.perform(&mut world.borrow_mut()),
                 None => eprintln!(
-                    "'{line}' is no command; there are: estop press|release, heat CELSIUS, overcurrent FACTOR, no-watchdog, counter restart"
+                    "'{line}' is no command; there are: estop press|release, heat CELSIUS, overcurrent FACTOR, no-watchdog, counter restart, reader input|output restart"
                 ),
             }
         }

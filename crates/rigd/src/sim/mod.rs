@@ -24,6 +24,7 @@ use gearmodel::NominalModel;
 use gearmodel::pitch_curve::AnyCurve;
 use thiserror::Error;
 
+use emulator::QsbClock;
 pub use plant::PlantSpec;
 use plant::undocumented::{OUTSIDE, UNDOCUMENTED, find};
 use pty::Terminal;
@@ -174,6 +175,23 @@ pub struct Extras {
     pub record: Option<PathBuf>,
     /// Takes commands from standard input.
     pub commands: bool,
+    /// QSB readers on both encoders, with these clocks, and a profile for them.
+    pub readers: Option<[QsbClock; 2]>,
+}
+
+/// Makes a profile one whose encoders are read by two QSB readers at these ports.
+fn read_by_qsb(profile: &mut Profile, [input, output]: [String; 2], lines: [u32; 2], zero_counts: [i64; 2]) {
+    let counter = &mut profile.counter;
+    counter.driver = crate::profile::qsb::DRIVER.into();
+    (counter.port, counter.baud) = (input, wire::qsb::BAUD);
+    counter.qsb = Some(crate::profile::qsb::QsbProfile {
+        output_port: output,
+        lines,
+        quadrature: 4,
+        interval_ticks: 1,
+        transit_difference_ms: 1.0,
+        zero_counts: Some(zero_counts),
+    });
 }
 
 /// Serves the rig on pseudo-terminals in `directory` until a stop is asked for, or the run that started it dies; prints a line a
@@ -211,7 +229,25 @@ pub async fn serve_ptys(
     let at = |name: &str| directory.join(name).display().to_string();
     (profile.servo.port, profile.brake.port, profile.counter.port) = (at("servo"), at("brake"), at("counter"));
     let written = directory.join("profile.toml");
-    std::fs::write(&written, profile.to_toml()).map_err(io(format!("profile {}", written.display())))?;
+    let save = |path: &Path, profile: &Profile| {
+        std::fs::write(path, profile.to_toml()).map_err(io(format!("profile {}", path.display())))
+    };
+    save(&written, &profile)?;
+    let mut at_readers = Vec::new();
+    if let Some(clocks) = extras.readers {
+        let zero_counts = world.borrow_mut().put_readers(clocks);
+        let mut by_readers = profile.clone();
+        // The plant's encoders after interpolation, as cycles of four counts.
+        let lines = [&spec.encoders.input, &spec.encoders.output]
+            .map(|encoder| u32::try_from(encoder.counts_per_rev() / 4).unwrap_or(u32::MAX));
+        read_by_qsb(&mut by_readers, [at("input"), at("output")], lines, zero_counts);
+        save(&directory.join("qsb.toml"), &by_readers)?;
+        for (which, name) in ["input", "output"].into_iter().enumerate() {
+            let (reader, at_reader) = port(name)?;
+            tokio::task::spawn_local(serve::reader(reader, Rc::clone(&world), which));
+            at_readers.push(at_reader);
+        }
+    }
 
     tokio::task::spawn_local(serve::modbus(servo, Rc::clone(&world), serve::Slave::servo(&profile)));
     tokio::task::spawn_local(serve::modbus(brake, Rc::clone(&world), serve::Slave::brake(&profile)));
@@ -230,13 +266,14 @@ pub async fn serve_ptys(
     writeln!(out, "ready").and_then(|()| out.flush()).map_err(unheard())?;
     while !stop.any() && !starter.has_died() {
         tokio::time::sleep(Duration::from_millis(50)).await;
-        for port in [&at_servo, &at_brake, &at_counter] {
+        for port in [&at_servo, &at_brake, &at_counter].into_iter().chain(&at_readers) {
             port.unlock();
         }
     }
     if starter.has_died() {
         // The run made the directory for itself and cannot clear it away any more.
-        drop((at_servo, at_brake, at_counter));
+        drop((at_servo, at_brake, at_counter, at_readers));
+        let _ = std::fs::remove_file(directory.join("qsb.toml"));
         let _ = std::fs::remove_file(&written);
         let _ = std::fs::remove_dir(&directory);
     }

@@ -119,3 +119,28 @@ pub async fn counter(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<Re
         world.borrow_mut().set_line_blocked(blocked);
     }
 }
+
+/// How often a reader's line is served: an adapter's latency.
+const READER_PERIOD: Duration = Duration::from_millis(2);
+
+/// Serves a QSB reader until its line is closed; what a full line does not take is lost.
+pub async fn reader(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<World>>, which: usize) {
+    let mut buffer = [0; 512];
+    let mut bytes = Vec::new();
+    loop {
+        let count = match timeout(READER_PERIOD, line.read(&mut buffer)).await {
+            Ok(Ok(0) | Err(_)) => return,
+            Ok(Ok(count)) => count,
+            Err(_) => 0,
+        };
+        {
+            let mut world = world.borrow_mut();
+            world.advance();
+            world.exchange_with_reader(which, &buffer[..count], &mut bytes);
+        }
+        if timeout(BLOCKED, line.write_all(&bytes)).await.is_ok_and(|written| written.is_err()) {
+            return;
+        }
+        bytes.clear();
+    }
+}

@@ -8,7 +8,8 @@ use wire::modbus::Request;
 use wire::rd60xx::Model;
 
 use super::emulator::{
-    BrakeCoil, BrakeEmulator, CounterEmulator, EncoderPair, Latched, Reply, ServoAxis, ServoEmulator,
+    BrakeCoil, BrakeEmulator, CounterEmulator, EncoderPair, Latched, QsbClock, QsbEmulator, Reply, ServoAxis,
+    ServoEmulator,
 };
 use super::plant::{Plant, PlantError, PlantSpec, Truth};
 use super::shaft_record::ShaftRecord;
@@ -32,6 +33,7 @@ pub struct World {
     servo: ServoEmulator,
     brake: BrakeEmulator,
     counter: CounterEmulator,
+    readers: Option<[QsbEmulator; 2]>,
     start: Instant,
     period_ns: u64,
     time_ns: u64,
@@ -69,6 +71,7 @@ impl World {
             servo: ServoEmulator::new(1),
             brake: BrakeEmulator::new(1, Model::Rd6006),
             counter,
+            readers: None,
             start: Instant::now(),
             period_ns: (1e9 / rate_hz).round() as u64,
             time_ns: 0,
@@ -167,6 +170,11 @@ impl World {
                 output_index: seen(self.plant.output_index_counts(), self.passed_before[1], output_from),
             };
             self.counter.sample(self.time_ns, &latched, &mut self.stream);
+            if let Some(readers) = &mut self.readers {
+                for (reader, count) in readers.iter_mut().zip(self.plant_counts) {
+                    reader.sample(self.time_ns, count);
+                }
+            }
             if let Some(record) = &mut self.record {
                 record.take(self.time_ns, &self.plant);
             }
@@ -174,6 +182,33 @@ impl World {
         self.servo.tick(now_ns, &mut self.plant);
         self.brake.tick(now_ns, &mut self.plant);
         self.counter.tick(now_ns, &mut self.stream);
+    }
+
+    /// Puts a QSB reader on each encoder, beside the counter box. Gives the counts at which both angles are zero.
+    pub fn put_readers(&mut self, clocks: [QsbClock; 2]) -> [i64; 2] {
+        self.readers = Some([QsbEmulator::new(clocks[0], 1), QsbEmulator::new(clocks[1], 2)]);
+        // Both counts are 0 where the shafts stand now, input shaft and output disc.
+        let [input, _, _, disc, _] = self.plant.truth().angles_rad;
+        let (input_per_rev, output_per_rev) = self.plant.counts_per_rev();
+        let zero = |angle: f64, per_rev: u64| -(angle / std::f64::consts::TAU * per_rev as f64).round() as i64;
+        [zero(input, input_per_rev), zero(disc, output_per_rev)]
+    }
+
+    /// A reader's line: takes bytes from its master, and gives what it sends.
+    pub fn exchange_with_reader(&mut self, which: usize, received: &[u8], sends: &mut Vec<u8>) {
+        if let Some(reader) = self.readers.as_mut().and_then(|readers| readers.get_mut(which)) {
+            reader.receive(received);
+            reader.take_output(sends);
+        }
+    }
+
+    /// Cuts a reader's power for an instant.
+    pub fn restart_reader(&mut self, which: usize) {
+        self.advance();
+        let time_ns = self.time_ns;
+        if let Some(reader) = self.readers.as_mut().and_then(|readers| readers.get_mut(which)) {
+            reader.restart(time_ns);
+        }
     }
 
     /// When the counter box looks for a full frame next.

@@ -114,11 +114,17 @@ pub struct Sim {
 
 impl Sim {
     pub fn start(seed: u64) -> Self {
+        Self::start_with(seed, &[])
+    }
+
+    /// With more options.
+    pub fn start_with(seed: u64, options: &[&str]) -> Self {
         let directory = TempDir::new().expect("a temporary directory");
         let begun = Instant::now();
         let ports = directory.path().join("ports");
         let mut command = rigd(directory.path());
         command.arg("sim").arg("--pty-dir").arg(&ports).arg("--seed").arg(seed.to_string()).stdout(Stdio::piped());
+        command.args(options);
         command.arg("--commands").arg("--record").arg(directory.path().join("shafts.csv")).stdin(Stdio::piped());
         let mut process = Process::spawn(&mut command);
         let output = process.0.stdout.take().expect("its output");
@@ -169,11 +175,16 @@ impl Sim {
 
     /// The profile that it wrote, made quicker, and changed by `edit`.
     pub fn profile(&self, edit: impl FnOnce(&mut Profile)) -> PathBuf {
-        let mut profile = Profile::load(&self.port("profile.toml")).expect("its own profile");
+        self.profile_of("profile.toml", edit)
+    }
+
+    /// Likewise another profile that it wrote.
+    pub fn profile_of(&self, name: &str, edit: impl FnOnce(&mut Profile)) -> PathBuf {
+        let mut profile = Profile::load(&self.port(name)).expect("its own profile");
         let sequence = &mut profile.sequence;
         (sequence.home_rpm, sequence.settle_s, sequence.load_s) = (30.0, 0.4, 0.4);
         edit(&mut profile);
-        let path = self.directory.path().join("quick.toml");
+        let path = self.directory.path().join(format!("quick-{name}"));
         std::fs::write(&path, profile.to_toml()).expect("a file");
         path
     }

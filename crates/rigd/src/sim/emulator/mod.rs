@@ -9,17 +9,20 @@
 //! | [`servo`] | Delta ASDA-B2 | Modbus RTU, `docs/wire/asda-b2.md` |
 //! | [`brake`] | Riden RD60xx | Modbus RTU, `docs/wire/rd60xx.md` |
 //! | [`counter`] | the rig's counter box | `docs/wire/counter-box.md` |
+//! | [`qsb`] | a QSB encoder reader | `docs/wire/qsb.md` |
 //! | [`mod@line`] | a Modbus line with a device at its end, and the faults a line can have | |
 
 pub mod brake;
 pub mod counter;
 pub mod line;
 mod parameters;
+pub mod qsb;
 pub mod servo;
 
 pub use brake::BrakeEmulator;
 pub use counter::{CounterEmulator, Latched};
 pub use line::{Fault, ModbusLine, Transmission};
+pub use qsb::{QsbClock, QsbEmulator};
 pub use servo::ServoEmulator;
 
 use wire::modbus::{ExceptionCode, Response};
