@@ -24,24 +24,12 @@ use crate::{Direction, NominalModel};
 const RUN_RATIOS: [f64; 6] = [0.02, 0.08, 0.3, 1.0, 3.0, 10.0];
 /// How far such a ratio usually is from what it is first taken to be: a factor of e to this.
 const RUN_RATIO_SPREAD: f64 = 1.5;
-/// Evidence from which a wave that does not close with the turn is taken into the pool, nats.
-const WANDERING_NATS: f64 = 8.0;
-/// Most times that what runs on with time is fitted under the scatter that it left, and the part of the scatter's square from which it
-/// is not worth another. Steps are not: whatever they are fitted to would leave less and less.
-const RUNNING_ON_ROUNDS: usize = 5;
-const QUIETER: f64 = 0.9;
-/// A set with an event that alone scores so much less than the best is not searched about, nats.
-const NEAR_NATS: f64 = 30.0;
-/// The same where the best model has nothing that the event could stand in for: it must be better by itself, nats.
-const NEARER_NATS: f64 = 0.0;
 /// Blocks smaller than this part of the largest are left out while its shape is moved.
 const LARGE: f64 = 0.12;
 /// Steps in which shapes are moved, in parts of their grid's.
 const SHARPENING_STEPS: [f64; 6] = [1.0, 0.6, 0.3, 0.15, 0.07, 0.03];
 /// What a moved shape must gain, nats: a fifth of its standard deviation.
 const SHARPER_NATS: f64 = 0.02;
-/// Most steps looked for between runs.
-const MOST_BETWEEN: usize = 4;
 /// Rounds of: search, look for events, sharpen shapes, estimate the noise anew.
 const ROUNDS: usize = 3;
 /// Log Bayes factor from which a sub-divisional error is taken off.
@@ -421,7 +409,7 @@ impl<'a> Engine<'a> {
             .map(|n| best.fit.set[n])
             .collect();
         let mut few = self.pool.beside(&self.grid);
-        let causes: Vec<Cause> = large.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
+        let causes = self.pool.causes(&large);
         let mut set = few.add(&self.grid, self.rig, causes);
         if set.len() < large.len() {
             return false;
@@ -438,7 +426,7 @@ impl<'a> Engine<'a> {
             }
         }
         if changed {
-            let shaped: Vec<Cause> = set.iter().map(|b| few.blocks[*b].cause.clone()).collect();
+            let shaped = few.causes(&set);
             let known: Vec<Option<usize>> = shaped.iter().map(|cause| self.block_of(cause)).collect();
             let fresh =
                 shaped.iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(cause, _)| cause.clone()).collect();
@@ -497,191 +485,6 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// The best model's blocks without what moves the level from revolution to revolution or run to run.
-    fn steady_set(&self) -> Vec<usize> {
-        let Some(best) = &self.best else { return Vec::new() };
-        let steady = |b: &usize| match &self.pool.blocks[*b].cause {
-            Cause::Effect { effect, shape, .. } => effect.signature_of(self.rig, shape).accumulates == Accumulates::No,
-            Cause::Unknown(pattern) => !pattern.moves_levels(),
-        };
-        best.fit.set.iter().copied().filter(steady).collect()
-    }
-
-    /// The amplitudes of that set alone.
-    fn steady_amplitudes(&self) -> Vec<(usize, f64)> {
-        evidence::fit(&self.pool, &self.whitened, &self.steady_set(), &[])
-            .map(|fit| fit.amplitudes())
-            .unwrap_or_default()
-    }
-
-    fn look_for_events(&mut self) -> bool {
-        let amplitudes = self.best.as_ref().map(|m| m.fit.amplitudes()).unwrap_or_default();
-        let steady = self.steady_amplitudes();
-        let found = events::find(&self.grid, &self.pool, &self.noise, &amplitudes, &steady);
-        let mut causes = Vec::new();
-        causes.extend(found.patterns.into_iter().map(Cause::Unknown));
-        let excluded = |effect: &dyn Effect| self.options.exclude.iter().any(|name| name == effect.name());
-        if let Some((number, effect)) = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.steps() && !excluded(*e)) {
-            let steps = |times_s: Vec<f64>| {
-                let [any, each] = events::STEPS_COST_NATS;
-                let cost_nats = any + each * times_s.len() as f64;
-                Cause::Effect { effect, number, shape: times_s, cost_nats }
-            };
-            causes.extend(found.steps.into_iter().map(steps));
-            causes.extend(self.steps_between_runs().map(steps));
-        }
-        causes.retain(|cause| self.block_of(cause).is_none());
-        let changed = !causes.is_empty();
-        for block in self.pool.add(&self.grid, self.rig, causes) {
-            if let Some(noise) = self.noise_with(&self.pool.blocks[block].cause, 1) {
-                self.weigh_event(block, noise);
-            }
-        }
-        changed
-    }
-
-    /// The steps of the best model and those between runs that take the place of levels of their own, if it has both.
-    fn steps_between_runs(&self) -> Option<Vec<f64>> {
-        let set = &self.best.as_ref()?.fit.set;
-        let mut times_s = set.iter().find_map(|b| match &self.pool.blocks[*b].cause {
-            Cause::Effect { effect, shape, .. } if effect.steps() && shape.len() > 1 => Some(shape.clone()),
-            _ => None,
-        })?;
-        let levels = |b: &usize| matches!(&self.pool.blocks[*b].cause, Cause::Unknown(Pattern::RunLevels { .. }));
-        if !set.iter().any(levels) {
-            return None;
-        }
-        let others: Vec<Cause> = self.steady_set().iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
-        let (number, effect) = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.steps())?;
-        let starts_s = self.grid.plan.starts_s.clone();
-        let mut before = f64::NEG_INFINITY;
-        for _ in 0..MOST_BETWEEN {
-            let mut few = self.pool.beside(&self.grid);
-            let set = few.add(&self.grid, self.rig, others.clone());
-            let with = |more: Option<&f64>| {
-                let mut shape: Vec<f64> = times_s.iter().chain(more).copied().collect();
-                shape.sort_by(f64::total_cmp);
-                Cause::Effect { effect, number, shape, cost_nats: 0.0 }
-            };
-            let tried: Vec<Cause> = std::iter::once(with(None)).chain(starts_s.iter().map(|t| with(Some(t)))).collect();
-            let tried = few.add(&self.grid, self.rig, tried);
-            let whitened = self.noise.whiten(&self.grid, &few);
-            let fit = evidence::fit(&few, &whitened, &set, &[])?;
-            let gains = evidence::scan(&few, &whitened, &fit, &tried);
-            let (best, gain) = tried.iter().zip(&gains).max_by(|a, b| a.1.total_cmp(b.1))?;
-            let Cause::Effect { shape, .. } = &few.blocks[*best].cause else { return None };
-            if *gain < before + events::STEPS_COST_NATS[1] || *shape == times_s {
-                break;
-            }
-            (before, times_s) = (*gain, shape.clone());
-        }
-        before.is_finite().then_some(times_s)
-    }
-
-    /// Looks for levels that settle in each run, swing or wander with time, and takes into the pool what is worth it.
-    fn look_for_what_runs_on(&mut self) -> bool {
-        let (settling, walk) = Pattern::running_on(&self.grid.plan);
-        let found: Vec<Cause> = self.steady_set().iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
-        let mut few = self.pool.beside(&self.grid);
-        let set = few.add(&self.grid, self.rig, found);
-        let tried = few.add(&self.grid, self.rig, settling.into_iter().map(Cause::Unknown).collect());
-        let whitened = self.noise.whiten(&self.grid, &few);
-        let Some(fit) = evidence::fit(&few, &whitened, &set, &[]) else { return false };
-        let gains = evidence::scan(&few, &whitened, &fit, &tried);
-        let settles = tried.iter().zip(gains).max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, gain)| *gain > 0.0);
-        let settles = settles.map(|(block, _)| few.blocks[*block].cause.clone());
-        let trace = few.trace(&self.grid, &fit.amplitudes());
-        let rest: Vec<f64> = self.grid.rho_rad.iter().zip(&trace).map(|(y, m)| y - m).collect();
-        let swings = slow_tone::strongest(&self.grid, &self.noise, &rest);
-        let mut changed = false;
-        for cause in settles.into_iter().chain(swings.into_iter().chain(walk).map(Cause::Unknown)) {
-            if let Some(noise) = self.noise_with(&cause, RUNNING_ON_ROUNDS) {
-                changed = true;
-                for block in self.pool.add(&self.grid, self.rig, vec![cause]) {
-                    self.weigh_event(block, noise.clone());
-                }
-            }
-        }
-        changed
-    }
-
-    /// Looks for waves over the driver's angle that do not close with its turn, in a pool of its own, and takes the best into the
-    /// pool where it is worth it.
-    fn look_for_wandering_waves(&mut self) -> bool {
-        let span_rev = self.grid.span_rev();
-        let mut patterns = Pattern::wandering(span_rev);
-        let mut step = 1.0;
-        let found: Vec<Cause> =
-            self.best.iter().flat_map(|m| &m.fit.set).map(|b| self.pool.blocks[*b].cause.clone()).collect();
-        let mut best: Option<(Pattern, f64)> = None;
-        for _ in 0..3 {
-            let mut few = self.pool.beside(&self.grid);
-            let set = few.add(&self.grid, self.rig, found.clone());
-            let tried = few.add(&self.grid, self.rig, patterns.iter().cloned().map(Cause::Unknown).collect());
-            let whitened = self.noise.whiten(&self.grid, &few);
-            let Some(fit) = evidence::fit(&few, &whitened, &set, &[]) else { return false };
-            for (block, gain) in tried.iter().zip(evidence::scan(&few, &whitened, &fit, &tried)) {
-                if let Cause::Unknown(pattern) = &few.blocks[*block].cause
-                    && best.as_ref().is_none_or(|(_, g)| gain > *g)
-                {
-                    best = Some((pattern.clone(), gain));
-                }
-            }
-            let Some((pattern, _)) = best.as_ref().filter(|(_, gain)| *gain > WANDERING_NATS) else { return false };
-            patterns = pattern.nearer(step, span_rev);
-            step *= 0.5;
-        }
-        let Some((pattern, _)) = best else { return false };
-        let added = self.pool.add(&self.grid, self.rig, vec![Cause::Unknown(pattern)]);
-        for block in &added {
-            if let Some(noise) = self.noise_with(&self.pool.blocks[*block].cause, 1) {
-                self.weigh_event(*block, noise);
-            }
-        }
-        !added.is_empty()
-    }
-
-    /// Steps and tones pass for scatter until they are taken off: the noise that one leaves beside what does not move the level,
-    /// where that alone comes near the best model.
-    fn noise_with(&self, event: &Cause, rounds: usize) -> Option<Noise> {
-        let steady = self.steady_set();
-        let best = self.best.as_ref()?;
-        let mut causes: Vec<Cause> = steady.iter().map(|b| self.pool.blocks[*b].cause.clone()).collect();
-        causes.push(event.clone());
-        // In a pool of its own: most events that are none fail here.
-        let mut few = self.pool.beside(&self.grid);
-        let own = few.add(&self.grid, self.rig, causes);
-        let mut noise = self.noise.clone();
-        // What passes for scatter holds its own amplitudes down until the scatter is less.
-        for _ in 0..rounds {
-            let before = noise.floor_rad2();
-            let fit = evidence::fit(&few, &noise.whiten(&self.grid, &few), &own, &[])?;
-            let run_ratio = noise.run_ratio;
-            noise = Noise::estimate(&self.grid, &few, &fit.amplitudes());
-            noise.run_ratio = run_ratio;
-            noise.run_ratio = self.best_run_ratio(&noise, &few, &fit);
-            if noise.floor_rad2() > QUIETER * before {
-                break;
-            }
-        }
-        let alone = Search::new(&few, &noise.whiten(&self.grid, &few), &self.options.known).model(own, None)?;
-        let room = if steady.len() < best.fit.set.len() { NEAR_NATS } else { NEARER_NATS };
-        (alone.score > best.score - room).then_some(noise)
-    }
-
-    /// Weighs a model with an event under the noise that it leaves against the best model under its own.
-    fn weigh_event(&mut self, block: usize, noise: Noise) {
-        let mut set = self.steady_set();
-        set.push(block);
-        let whitened = noise.whiten(&self.grid, &self.pool);
-        let with_event = Search::new(&self.pool, &whitened, &self.options.known).climb(set, Allowed::All);
-        if let Some(model) = with_event.filter(|model| self.best.as_ref().is_none_or(|best| model.score > best.score)) {
-            self.best = Some(model);
-            self.noise = noise;
-            self.whitened = whitened;
-        }
-    }
-
     /// Amplitudes of block `n` of a model in the effect's own units.
     fn raw(&self, model: &Model, n: usize) -> Estimate {
         amplitudes_of(&self.pool, &model.fit, n)
@@ -700,5 +503,7 @@ fn amplitudes_of(pool: &Pool, fit: &evidence::Fit, n: usize) -> Estimate {
     }
 }
 
+#[path = "hidden.rs"]
+mod hidden;
 #[path = "report.rs"]
 mod report;

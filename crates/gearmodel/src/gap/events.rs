@@ -63,25 +63,23 @@ pub struct Events {
 /// have taken the steps for a drift.
 #[must_use]
 pub fn find(grid: &Grid, pool: &Pool, noise: &Noise, amplitudes: &[(usize, f64)], steady: &[(usize, f64)]) -> Events {
-    let trace = pool.trace(grid, amplitudes);
+    let rest = pool.rest(grid, amplitudes);
     let mut steps: Vec<Vec<f64>> = Vec::new();
-    let mut look = |trace: &[f64]| {
-        let rest: Vec<f64> = grid.rho_rad.iter().zip(trace).map(|(y, m)| y - m).collect();
-        let sectors = sectors(grid, noise, &rest);
+    let mut look = |rest: &[f64]| {
+        let sectors = sectors(grid, noise, rest);
         for tied in [false, true] {
             if let Some((times_s, size_rad)) = find_steps(&sectors, tied) {
-                let times_s = sharpen(grid, &rest, &times_s, size_rad);
+                let times_s = sharpen(grid, rest, &times_s, size_rad);
                 if !steps.contains(&times_s) {
                     steps.push(times_s);
                 }
             }
         }
     };
-    look(&trace);
+    look(&rest);
     if steady.len() < amplitudes.len() {
-        look(&pool.trace(grid, steady));
+        look(&pool.rest(grid, steady));
     }
-    let rest: Vec<f64> = grid.rho_rad.iter().zip(&trace).map(|(y, m)| y - m).collect();
     Events { patterns: single_steps(grid, noise, &rest), steps }
 }
 

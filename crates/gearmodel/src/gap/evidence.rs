@@ -61,13 +61,10 @@ impl Fit {
     #[must_use]
     pub fn rms_rad(&self, pool: &Pool, n: usize) -> f64 {
         let place = self.place(pool, n);
-        let weight = pool.products[(ZERO, ZERO)];
         let mut square = 0.0;
         for a in place.clone() {
             for b in place.clone() {
-                let (m, n) = (self.columns[a], self.columns[b]);
-                let centred = pool.products[(m, n)] - pool.products[(m, ZERO)] * pool.products[(n, ZERO)] / weight;
-                square += self.mean[a] * self.mean[b] * centred / weight;
+                square += self.mean[a] * self.mean[b] * pool.covariance(self.columns[a], self.columns[b]);
             }
         }
         square.max(0.0).sqrt()

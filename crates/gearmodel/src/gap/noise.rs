@@ -108,8 +108,7 @@ impl Noise {
                 (revolution.coverage >= FULL).then(|| Cholesky::new(k).map(|c| c.solve(&e))).flatten()
             })
             .collect();
-        let trace = pool.trace(grid, amplitudes);
-        let rest: Vec<f64> = grid.rho_rad.iter().zip(&trace).map(|(y, m)| y - m).collect();
+        let rest = pool.rest(grid, amplitudes);
         let (white_rad2, weight) = white(grid, &fitted, &rest);
         // Squared differences between neighbouring revolutions, by order.
         let mut squares: Vec<Vec<f64>> = vec![Vec::new(); ORDERS + 1];

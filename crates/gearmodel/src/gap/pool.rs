@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
 use super::columns::{Columns, Values};
+use super::evidence::{RESIDUAL, ZERO};
 use super::gram;
 use super::grid::Grid;
 use super::noise::WAVES;
@@ -198,12 +199,23 @@ impl Pool {
         self.columns.len()
     }
 
+    /// Causes of blocks.
+    #[must_use]
+    pub fn causes(&self, blocks: &[usize]) -> Vec<Cause> {
+        blocks.iter().map(|b| self.blocks[*b].cause.clone()).collect()
+    }
+
+    /// Mean product of two columns over the samples, their means taken off.
+    #[must_use]
+    pub fn covariance(&self, m: usize, n: usize) -> f64 {
+        let weight = self.products[(ZERO, ZERO)];
+        (self.products[(m, n)] - self.products[(m, ZERO)] * self.products[(n, ZERO)] / weight) / weight
+    }
+
     /// RMS of the residual, its mean taken off, rad.
     #[must_use]
     pub fn residual_rms_rad(&self) -> f64 {
-        let weight = self.products[(1, 1)];
-        let mean = self.products[(0, 1)] / weight;
-        (self.products[(0, 0)] / weight - mean * mean).max(0.0).sqrt()
+        self.covariance(RESIDUAL, RESIDUAL).max(0.0).sqrt()
     }
 
     /// ZᵀWZ of every revolution.
@@ -261,12 +273,13 @@ impl Pool {
         };
         let (stations, weights) =
             if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.base.cell_weight) };
-        let raw = match cause {
-            Cause::Unknown(pattern) => match pattern.growing() {
-                Some((steady, mean_s)) => grown(grid, &rows(&Cause::Unknown(steady), rig, &grid.cells, width), mean_s),
-                None => rows(cause, rig, stations, width),
-            },
-            Cause::Effect { .. } => rows(cause, rig, stations, width),
+        let growing = match cause {
+            Cause::Unknown(pattern) => pattern.growing(),
+            Cause::Effect { .. } => None,
+        };
+        let raw = match growing {
+            Some((steady, mean_s)) => grown(grid, &rows(&Cause::Unknown(steady), rig, &grid.cells, width), mean_s),
+            None => rows(cause, rig, stations, width),
         };
         let total: f64 = weights.iter().sum();
         // A constant is the zero's; what is left of a column is its trace.
@@ -322,6 +335,12 @@ impl Pool {
     #[must_use]
     pub fn column(&self, grid: &Grid, column: usize) -> Vec<f64> {
         self.columns.at_places(grid, column)
+    }
+
+    /// What a model (column, amplitude) leaves of the residual at every place.
+    #[must_use]
+    pub fn rest(&self, grid: &Grid, amplitudes: &[(usize, f64)]) -> Vec<f64> {
+        grid.rho_rad.iter().zip(self.trace(grid, amplitudes)).map(|(y, m)| y - m).collect()
     }
 
     /// Σ columns · amplitudes at every place.

@@ -436,12 +436,13 @@ impl Engine<'_> {
             return rows;
         }
         let columns = &best.fit.columns;
-        let products = &self.pool.products;
-        let weight = products[(1, 1)];
-        let centred = |a: usize, b: usize| (products[(a, b)] - products[(a, 1)] * products[(b, 1)] / weight) / weight;
         let covariance = |a: std::ops::Range<usize>, beta: &dyn Fn(usize) -> f64| -> f64 {
-            a.map(|m| (1..columns.len()).map(|n| beta(m) * beta(n) * centred(columns[m], columns[n])).sum::<f64>())
-                .sum()
+            a.map(|m| {
+                (1..columns.len())
+                    .map(|n| beta(m) * beta(n) * self.pool.covariance(columns[m], columns[n]))
+                    .sum::<f64>()
+            })
+            .sum()
         };
         let mean = |n: usize| best.fit.mean[n];
         let mut explained = 0.0;

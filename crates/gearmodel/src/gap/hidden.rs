@@ -1,0 +1,214 @@
+//! What passes for scatter until it is looked for: steps, waves that do not close with the turn, and what runs on with time. Each is
+//! weighed under the scatter that it leaves.
+
+use super::*;
+
+/// Evidence from which a wave that does not close with the turn is taken into the pool, nats.
+const WANDERING_NATS: f64 = 8.0;
+/// Most times that what runs on with time is fitted under the scatter that it left, and the part of the scatter's square from which it
+/// is not worth another. Steps are not: whatever they are fitted to would leave less and less.
+const RUNNING_ON_ROUNDS: usize = 5;
+const QUIETER: f64 = 0.9;
+/// A set with an event that alone scores so much less than the best is not searched about, nats.
+const NEAR_NATS: f64 = 30.0;
+/// The same where the best model has nothing that the event could stand in for: it must be better by itself, nats.
+const NEARER_NATS: f64 = 0.0;
+/// Most steps looked for between runs.
+const MOST_BETWEEN: usize = 4;
+
+/// Causes in a pool of their own, with what each would add to the set that is fitted there.
+struct Beside {
+    pool: Pool,
+    fit: evidence::Fit,
+    /// Blocks tried with their gain in log evidence.
+    gains: Vec<(usize, f64)>,
+}
+
+impl Beside {
+    fn best(&self) -> Option<(usize, f64)> {
+        self.gains.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+impl Engine<'_> {
+    /// The best model's blocks without what moves the level from revolution to revolution or run to run.
+    fn steady_set(&self) -> Vec<usize> {
+        let Some(best) = &self.best else { return Vec::new() };
+        let steady = |b: &usize| match &self.pool.blocks[*b].cause {
+            Cause::Effect { effect, shape, .. } => effect.signature_of(self.rig, shape).accumulates == Accumulates::No,
+            Cause::Unknown(pattern) => !pattern.moves_levels(),
+        };
+        best.fit.set.iter().copied().filter(steady).collect()
+    }
+
+    /// The amplitudes of that set alone.
+    fn steady_amplitudes(&self) -> Vec<(usize, f64)> {
+        evidence::fit(&self.pool, &self.whitened, &self.steady_set(), &[])
+            .map(|fit| fit.amplitudes())
+            .unwrap_or_default()
+    }
+
+    /// Looks for steps, and takes what is found into the pool.
+    pub(super) fn look_for_events(&mut self) -> bool {
+        let amplitudes = self.best.as_ref().map(|m| m.fit.amplitudes()).unwrap_or_default();
+        let steady = self.steady_amplitudes();
+        let found = events::find(&self.grid, &self.pool, &self.noise, &amplitudes, &steady);
+        let mut causes = Vec::new();
+        causes.extend(found.patterns.into_iter().map(Cause::Unknown));
+        let excluded = |effect: &dyn Effect| self.options.exclude.iter().any(|name| name == effect.name());
+        if let Some((number, effect)) = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.steps() && !excluded(*e)) {
+            let steps = |times_s: Vec<f64>| {
+                let [any, each] = events::STEPS_COST_NATS;
+                let cost_nats = any + each * times_s.len() as f64;
+                Cause::Effect { effect, number, shape: times_s, cost_nats }
+            };
+            causes.extend(found.steps.into_iter().map(steps));
+            causes.extend(self.steps_between_runs(&steps).map(steps));
+        }
+        causes.retain(|cause| self.block_of(cause).is_none());
+        let changed = !causes.is_empty();
+        self.add_and_weigh(causes);
+        changed
+    }
+
+    /// The steps of the best model and those between runs that take the place of levels of their own, if it has both.
+    fn steps_between_runs(&self, steps: &dyn Fn(Vec<f64>) -> Cause) -> Option<Vec<f64>> {
+        let set = &self.best.as_ref()?.fit.set;
+        let mut times_s = set.iter().find_map(|b| match &self.pool.blocks[*b].cause {
+            Cause::Effect { effect, shape, .. } if effect.steps() && shape.len() > 1 => Some(shape.clone()),
+            _ => None,
+        })?;
+        let levels = |b: &usize| matches!(&self.pool.blocks[*b].cause, Cause::Unknown(Pattern::RunLevels { .. }));
+        if !set.iter().any(levels) {
+            return None;
+        }
+        let others = self.pool.causes(&self.steady_set());
+        let mut before = f64::NEG_INFINITY;
+        for _ in 0..MOST_BETWEEN {
+            let with = |more: Option<&f64>| {
+                let mut shape: Vec<f64> = times_s.iter().chain(more).copied().collect();
+                shape.sort_by(f64::total_cmp);
+                steps(shape)
+            };
+            let tried = std::iter::once(with(None)).chain(self.grid.plan.starts_s.iter().map(|t| with(Some(t))));
+            let beside = self.beside(others.clone(), tried.collect())?;
+            let (best, gain) = beside.best()?;
+            let Cause::Effect { shape, .. } = &beside.pool.blocks[best].cause else { return None };
+            if gain < before + events::STEPS_COST_NATS[1] || *shape == times_s {
+                break;
+            }
+            (before, times_s) = (gain, shape.clone());
+        }
+        before.is_finite().then_some(times_s)
+    }
+
+    /// Looks for levels that settle in each run, swing or wander with time, and takes into the pool what is worth it.
+    pub(super) fn look_for_what_runs_on(&mut self) -> bool {
+        let (settling, walk) = Pattern::running_on(&self.grid.plan);
+        let settling = settling.into_iter().map(Cause::Unknown).collect();
+        let Some(beside) = self.beside(self.pool.causes(&self.steady_set()), settling) else { return false };
+        let settles = beside.best().filter(|(_, gain)| *gain > 0.0);
+        let settles = settles.map(|(block, _)| beside.pool.blocks[block].cause.clone());
+        let rest = beside.pool.rest(&self.grid, &beside.fit.amplitudes());
+        let swings = slow_tone::strongest(&self.grid, &self.noise, &rest);
+        let mut changed = false;
+        for cause in settles.into_iter().chain(swings.into_iter().chain(walk).map(Cause::Unknown)) {
+            if let Some(noise) = self.noise_with(&cause, RUNNING_ON_ROUNDS) {
+                changed = true;
+                for block in self.pool.add(&self.grid, self.rig, vec![cause]) {
+                    self.weigh_event(block, noise.clone());
+                }
+            }
+        }
+        changed
+    }
+
+    /// Looks for waves over the driver's angle that do not close with its turn, in a pool of its own, and takes the best into the
+    /// pool where it is worth it.
+    pub(super) fn look_for_wandering_waves(&mut self) -> bool {
+        let span_rev = self.grid.span_rev();
+        let mut patterns = Pattern::wandering(span_rev);
+        let mut step = 1.0;
+        let found = self.best.as_ref().map(|m| self.pool.causes(&m.fit.set)).unwrap_or_default();
+        let mut best: Option<(Pattern, f64)> = None;
+        for _ in 0..3 {
+            let tried = patterns.iter().cloned().map(Cause::Unknown).collect();
+            let Some(beside) = self.beside(found.clone(), tried) else { return false };
+            for (block, gain) in &beside.gains {
+                if let Cause::Unknown(pattern) = &beside.pool.blocks[*block].cause
+                    && best.as_ref().is_none_or(|(_, g)| gain > g)
+                {
+                    best = Some((pattern.clone(), *gain));
+                }
+            }
+            let Some((pattern, _)) = best.as_ref().filter(|(_, gain)| *gain > WANDERING_NATS) else { return false };
+            patterns = pattern.nearer(step, span_rev);
+            step *= 0.5;
+        }
+        let Some((pattern, _)) = best else { return false };
+        self.add_and_weigh(vec![Cause::Unknown(pattern)])
+    }
+
+    /// Adds events to the pool and weighs each; true where any could be added.
+    fn add_and_weigh(&mut self, events: Vec<Cause>) -> bool {
+        let added = self.pool.add(&self.grid, self.rig, events);
+        for block in &added {
+            if let Some(noise) = self.noise_with(&self.pool.blocks[*block].cause, 1) {
+                self.weigh_event(*block, noise);
+            }
+        }
+        !added.is_empty()
+    }
+
+    /// What each of several causes would add to a set of others, in a pool of their own.
+    fn beside(&self, others: Vec<Cause>, tried: Vec<Cause>) -> Option<Beside> {
+        let mut pool = self.pool.beside(&self.grid);
+        let set = pool.add(&self.grid, self.rig, others);
+        let tried = pool.add(&self.grid, self.rig, tried);
+        let whitened = self.noise.whiten(&self.grid, &pool);
+        let fit = evidence::fit(&pool, &whitened, &set, &[])?;
+        let gains = evidence::scan(&pool, &whitened, &fit, &tried);
+        Some(Beside { gains: tried.into_iter().zip(gains).collect(), pool, fit })
+    }
+
+    /// Steps and tones pass for scatter until they are taken off: the noise that one leaves beside what does not move the level,
+    /// where that alone comes near the best model.
+    fn noise_with(&self, event: &Cause, rounds: usize) -> Option<Noise> {
+        let steady = self.steady_set();
+        let best = self.best.as_ref()?;
+        let mut causes = self.pool.causes(&steady);
+        causes.push(event.clone());
+        // In a pool of its own: most events that are none fail here.
+        let mut few = self.pool.beside(&self.grid);
+        let own = few.add(&self.grid, self.rig, causes);
+        let mut noise = self.noise.clone();
+        // What passes for scatter holds its own amplitudes down until the scatter is less.
+        for _ in 0..rounds {
+            let before = noise.floor_rad2();
+            let fit = evidence::fit(&few, &noise.whiten(&self.grid, &few), &own, &[])?;
+            let run_ratio = noise.run_ratio;
+            noise = Noise::estimate(&self.grid, &few, &fit.amplitudes());
+            noise.run_ratio = run_ratio;
+            noise.run_ratio = self.best_run_ratio(&noise, &few, &fit);
+            if noise.floor_rad2() > QUIETER * before {
+                break;
+            }
+        }
+        let alone = Search::new(&few, &noise.whiten(&self.grid, &few), &self.options.known).model(own, None)?;
+        let room = if steady.len() < best.fit.set.len() { NEAR_NATS } else { NEARER_NATS };
+        (alone.score > best.score - room).then_some(noise)
+    }
+
+    /// Weighs a model with an event under the noise that it leaves against the best model under its own.
+    fn weigh_event(&mut self, block: usize, noise: Noise) {
+        let mut set = self.steady_set();
+        set.push(block);
+        let whitened = noise.whiten(&self.grid, &self.pool);
+        let with_event = Search::new(&self.pool, &whitened, &self.options.known).climb(set, Allowed::All);
+        if let Some(model) = with_event.filter(|model| self.best.as_ref().is_none_or(|best| model.score > best.score)) {
+            self.best = Some(model);
+            self.noise = noise;
+            self.whitened = whitened;
+        }
+    }
+}
