@@ -159,6 +159,11 @@ pub trait Effect: Sync {
     /// Trace per unit amplitude at a station, rad; `row` has `width` entries, all zero on entry.
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]);
 
+    /// [`Effect::row`] for station after station, with what they share worked out once.
+    fn rows<'a>(&'a self, rig: &'a Rig, shape: &'a Shape) -> Box<dyn FnMut(&Station, &mut [f64]) + 'a> {
+        Box::new(move |at, row| self.row(rig, shape, at, row))
+    }
+
     /// True where the trace differs between revolutions of one condition.
     fn evolves(&self, _shape: &Shape) -> bool {
         false

@@ -15,8 +15,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
-    StatedError, Station, stated,
+    Carrier, Effect, Estimate, Given, Grain, MeshOrders, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
+    StatedEffect, StatedError, Station, stated,
 };
 
 /// What excites it, as a file states it, and the kind that it is.
@@ -36,6 +36,29 @@ fn response(number: f64, x: f64, zeta: f64) -> [f64; 2] {
         2 => over(1.0, im),
         _ => over(x * x, 0.0),
     }
+}
+
+/// H(nω) E_n of the mesh's orders, `x` the turn's frequency over f.
+fn through(orders: &MeshOrders, number: f64, x: f64, zeta: f64) -> Vec<[f64; 2]> {
+    (orders.first..)
+        .zip(&orders.amplitudes)
+        .map(|(order, [a, b])| {
+            let [h, g] = response(number, f64::from(order) * x, zeta);
+            [h * a - g * b, h * b + g * a]
+        })
+        .collect()
+}
+
+/// Σ c_n e^{jnθ} from n = `first` on.
+fn sum_of_orders(first: i32, amplitudes: &[[f64; 2]], theta_rad: f64) -> (f64, f64) {
+    // Horner's rule in e^{jθ}.
+    let (sin, cos) = theta_rad.sin_cos();
+    let (mut re, mut im) = (0.0, 0.0);
+    for [a, b] in amplitudes.iter().rev() {
+        (re, im) = (re * cos - im * sin + a, re * sin + im * cos + b);
+    }
+    let (sin, cos) = (f64::from(first) * theta_rad).sin_cos();
+    (re * cos - im * sin, re * sin + im * cos)
 }
 
 /// Once a turn of the driver.
@@ -164,33 +187,35 @@ impl Effect for TorsionalResonance {
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
-        let [kind, f_hz, zeta, ref rest @ ..] = shape[..] else { return };
-        if kind == ENCODER {
-            row[0] = encoder_lead_rad(rig, f_hz, zeta, at);
-            return;
-        }
+        self.rows(rig, shape)(at, row);
+    }
+
+    fn rows<'a>(&'a self, rig: &'a Rig, shape: &'a Shape) -> Box<dyn FnMut(&Station, &mut [f64]) + 'a> {
+        let [kind, f_hz, zeta, ref rest @ ..] = shape[..] else { return Box::new(|_, _| ()) };
         let number = rest.first().copied().unwrap_or(0.0);
-        let hz = at.speed_rad_per_s / TAU;
-        let (sin, cos) = at.theta1_rad.sin_cos();
-        let (re, im) = if kind == MESH {
-            let orders = rig.mesh_orders();
-            let (mut wave_sin, mut wave_cos) = (f64::from(orders.first) * at.theta1_rad).sin_cos();
-            let (mut re, mut im) = (0.0, 0.0);
-            for (order, [a, b]) in (orders.first..).zip(&orders.amplitudes) {
-                let [h, g] = response(number, f64::from(order) * hz / f_hz, zeta);
-                let (e_re, e_im) = (a * wave_cos - b * wave_sin, a * wave_sin + b * wave_cos);
-                re += h * e_re - g * e_im;
-                im += h * e_im + g * e_re;
-                (wave_cos, wave_sin) = (wave_cos * cos - wave_sin * sin, wave_sin * cos + wave_cos * sin);
+        let orders = rig.mesh_orders();
+        // Amplitudes of the orders change with the speed only, which a run keeps.
+        let mut last: Option<(f64, Vec<[f64; 2]>)> = None;
+        let mut sum = move |first: i32, at: &Station, amplitudes: &dyn Fn(f64) -> Vec<[f64; 2]>| {
+            let hz = at.speed_rad_per_s / TAU;
+            if last.as_ref().is_none_or(|(of, _)| *of != hz) {
+                last = None;
             }
-            // The cw flank stands half a pitch on.
-            (at.sense * re, at.sense * im)
-        } else {
-            let [h, g] = response(number, hz / f_hz, zeta);
-            (h * cos - g * sin, h * sin + g * cos)
+            let (_, known) = last.get_or_insert_with(|| (hz, amplitudes(hz)));
+            sum_of_orders(first, known, at.theta1_rad)
         };
-        row[0] = im;
-        row[1] = re;
+        match kind {
+            ENCODER => Box::new(move |at, row| row[0] = sum(1, at, &|hz| encoder_lead(rig, f_hz, zeta, hz)).0),
+            MESH => Box::new(move |at, row| {
+                let (re, im) = sum(orders.first, at, &|hz| through(orders, number, hz / f_hz, zeta));
+                // The cw flank stands half a pitch on.
+                (row[0], row[1]) = (at.sense * im, at.sense * re);
+            }),
+            _ => Box::new(move |at, row| {
+                let (re, im) = sum(1, at, &|hz| vec![response(number, hz / f_hz, zeta)]);
+                (row[0], row[1]) = (im, re);
+            }),
+        }
     }
 
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
@@ -240,21 +265,17 @@ fn frequencies(highest_hz: f64, ratio: f64) -> impl Iterator<Item = f64> {
     (0..=count).map(move |n| FREQUENCIES[0] * highest_hz * ratio.powi(n))
 }
 
-/// Steady lead of the output encoder's disc over its shaft, rad (kind 2).
-fn encoder_lead_rad(rig: &Rig, f_hz: f64, zeta: f64, at: &Station) -> f64 {
-    let omega0 = TAU * f_hz;
-    let omega = at.speed_rad_per_s;
-    let (step_sin, step_cos) = at.theta1_rad.sin_cos();
-    // e^{jnθ1}, turned on order by order.
-    let (mut cos, mut sin) = (1.0, 0.0);
-    let mut lead_rad = 0.0;
-    for (n, [a, b]) in (1_u32..).zip(rig.ratio_orders()) {
-        (cos, sin) = (cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin);
-        let order_omega = f64::from(n) * omega;
-        // q̈_n = Re Z, Z/(n ω²) = (b + ja) e^{jnθ1}.
-        let (z_re, z_im) = (b * cos - a * sin, b * sin + a * cos);
-        let (re, im) = (omega0 * omega0 - order_omega * order_omega, 2.0 * zeta * omega0 * order_omega);
-        lead_rad -= omega * order_omega * (z_re * re + z_im * im) / (re * re + im * im);
-    }
-    lead_rad
+/// Amplitudes of e^{jnθ1} in the lead of the encoder's disc, rad, at a speed in turns a second.
+fn encoder_lead(rig: &Rig, f_hz: f64, zeta: f64, hz: f64) -> Vec<[f64; 2]> {
+    let (omega0, omega) = (TAU * f_hz, TAU * hz);
+    (1_u32..)
+        .zip(rig.ratio_orders())
+        .map(|(n, [a, b])| {
+            let order_omega = f64::from(n) * omega;
+            // −q̈_n = −Re nω² (b + ja) e^{jnθ1}, over D = ω0² − (nω)² + 2jζω0 nω.
+            let (re, im) = (omega0 * omega0 - order_omega * order_omega, 2.0 * zeta * omega0 * order_omega);
+            let factor = -omega * order_omega / (re * re + im * im);
+            [factor * (b * re + a * im), factor * (a * re - b * im)]
+        })
+        .collect()
 }

@@ -63,14 +63,23 @@ impl Columns {
         }
     }
 
+    /// Some of the columns, copied.
+    pub(super) fn only(&self, grid: &Grid, columns: &[usize]) -> Self {
+        let mut few = Self::default();
+        columns.iter().for_each(|column| few.push(grid, self.values(grid, *column)));
+        few
+    }
+
+    fn values(&self, grid: &Grid, column: usize) -> Values {
+        match self.slots[column] {
+            Slot::Cells(n) => Values::Cells(self.cells(grid).column(n).iter().copied().collect()),
+            Slot::Places(n) => Values::Places(self.places(grid).column(n).iter().copied().collect()),
+        }
+    }
+
     /// Keeps the first columns and some of those after them.
     pub(super) fn keep(&mut self, grid: &Grid, first: usize, others: std::ops::Range<usize>) {
-        let kept: Vec<Values> = others
-            .map(|column| match self.slots[column] {
-                Slot::Cells(n) => Values::Cells(self.cells(grid).column(n).iter().copied().collect()),
-                Slot::Places(n) => Values::Places(self.places(grid).column(n).iter().copied().collect()),
-            })
-            .collect();
+        let kept: Vec<Values> = others.map(|column| self.values(grid, column)).collect();
         self.slots.truncate(first);
         let cells = self.slots.iter().filter(|slot| matches!(slot, Slot::Cells(_))).count();
         self.in_cells.truncate(cells * grid.cells.len());

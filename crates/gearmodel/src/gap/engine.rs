@@ -315,7 +315,7 @@ impl<'a> Engine<'a> {
         let noise = Noise::estimate(&grid, &pool, &[]);
         let ghosts = ghosts::find(&grid, &noise, &grid.rho_rad);
         pool.add(&grid, rig, ghosts.into_iter().map(Cause::Unknown).collect());
-        let whitened = Whitened { gram: nalgebra::DMatrix::zeros(0, 0), log_det: 0.0 };
+        let whitened = Whitened::empty();
         Self { rig, aside, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None }
     }
 
@@ -408,12 +408,8 @@ impl<'a> Engine<'a> {
             .filter(|n| best.fit.rms_rad(&self.pool, *n) > LARGE * largest)
             .map(|n| best.fit.set[n])
             .collect();
-        let mut few = self.pool.beside(&self.grid);
-        let causes = self.pool.causes(&large);
-        let mut set = few.add(&self.grid, self.rig, causes);
-        if set.len() < large.len() {
-            return false;
-        }
+        let mut few = self.pool.only(&self.grid, &large);
+        let mut set: Vec<usize> = (0..large.len()).collect();
         let mut changed = false;
         for step in SHARPENING_STEPS {
             let mut moved = false;
@@ -451,7 +447,7 @@ impl<'a> Engine<'a> {
         let Some(now) = evidence::fit(few, &whitened, set, &[]) else { return false };
         let fresh: Vec<Cause> = match few.blocks[set[n]].cause.clone() {
             Cause::Effect { effect, number, shape, cost_nats } => {
-                let refined = effect.refine(self.rig, &shape, &amplitudes_of(few, &now, n).beta);
+                let refined = effect.refine(self.rig, &shape, &amplitudes_of(few, &whitened, &now, n).beta);
                 let shapes = effect.neighbours(&shape, step).into_iter().chain(refined);
                 shapes.map(|shape| Cause::Effect { effect, number, shape, cost_nats }).collect()
             }
@@ -487,16 +483,17 @@ impl<'a> Engine<'a> {
 
     /// Amplitudes of block `n` of a model in the effect's own units.
     fn raw(&self, model: &Model, n: usize) -> Estimate {
-        amplitudes_of(&self.pool, &model.fit, n)
+        amplitudes_of(&self.pool, &self.whitened, &model.fit, n)
     }
 }
 
 /// Amplitudes of block `n` of a fit in the effect's own units.
-fn amplitudes_of(pool: &Pool, fit: &evidence::Fit, n: usize) -> Estimate {
+fn amplitudes_of(pool: &Pool, whitened: &Whitened, fit: &evidence::Fit, n: usize) -> Estimate {
     let block = &pool.blocks[fit.set[n]];
     let place = fit.place(pool, n);
     let mean = fit.mean.rows(place.start, place.len());
-    let covariance = fit.covariance.view((place.start, place.start), (place.len(), place.len()));
+    let covariance = evidence::covariance(pool, whitened, fit);
+    let covariance = covariance.view((place.start, place.start), (place.len(), place.len()));
     Estimate {
         beta: (&block.transform * mean).iter().copied().collect(),
         covariance: &block.transform * covariance * block.transform.transpose(),

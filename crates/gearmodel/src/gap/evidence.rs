@@ -4,9 +4,10 @@
 //! one huge effect does not hide small ones. A candidate's scale is averaged over a grid from 1 µrad to 1 mrad; the scales of
 //! a set are then moved to where its evidence is largest, each at the cost of having been free.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use super::noise::Whitened;
+use super::normal::{Normal, select};
 use super::pool::{Block, Pool};
 
 /// Scales of a candidate, rad: 1 µrad to 1 mrad.
@@ -37,8 +38,6 @@ pub struct Fit {
     pub columns: Vec<usize>,
     /// Amplitudes of the columns.
     pub mean: DVector<f64>,
-    /// Their covariance.
-    pub covariance: DMatrix<f64>,
     /// Log evidence, prior of the set not included.
     pub log_evidence: f64,
 }
@@ -75,14 +74,6 @@ fn columns(blocks: &[Block], set: &[usize]) -> Vec<usize> {
     std::iter::once(ZERO).chain(set.iter().flat_map(|b| blocks[*b].columns.clone())).collect()
 }
 
-fn select(gram: &DMatrix<f64>, columns: &[usize]) -> (DMatrix<f64>, DVector<f64>) {
-    let p = columns.len();
-    (
-        DMatrix::from_fn(p, p, |a, b| gram[(columns[a], columns[b])]),
-        DVector::from_fn(p, |a, _| gram[(columns[a], RESIDUAL)]),
-    )
-}
-
 /// Prior variances of the columns.
 fn prior(blocks: &[Block], set: &[usize], scales_rad: &[f64]) -> Vec<f64> {
     let mut variances = vec![ZERO_RAD * ZERO_RAD];
@@ -93,86 +84,52 @@ fn prior(blocks: &[Block], set: &[usize], scales_rad: &[f64]) -> Vec<f64> {
     variances
 }
 
-struct Solved {
-    cholesky: Cholesky<f64, Dyn>,
-    mean: DVector<f64>,
-    log_evidence: f64,
-}
-
-fn solve(g: &DMatrix<f64>, b: &DVector<f64>, variances: &[f64]) -> Option<Solved> {
-    let mut a = g.clone();
-    for (n, variance) in variances.iter().enumerate() {
-        a[(n, n)] += 1.0 / variance;
-    }
-    let cholesky = Cholesky::new(a)?;
-    let mean = cholesky.solve(b);
-    let log_det = 2.0 * cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
-        + variances.iter().map(|v| v.ln()).sum::<f64>();
-    let log_evidence = 0.5 * b.dot(&mean) - 0.5 * log_det;
-    Some(Solved { cholesky, mean, log_evidence })
-}
-
-/// L⁻¹ of A = LLᵀ: A⁻¹ is its Gram matrix. Half the work of solving for the identity, most of which is zeros.
-fn lower_inverse(cholesky: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
-    let l = cholesky.l_dirty();
-    let n = l.nrows();
-    let mut inverse = DMatrix::zeros(n, n);
-    for (j, mut column) in inverse.column_iter_mut().enumerate() {
-        column[j] = 1.0;
-        for k in j..n {
-            let value = column[k] / l[(k, k)];
-            column[k] = value;
-            column.rows_mut(k + 1, n - k - 1).axpy(-value, &l.column(k).rows(k + 1, n - k - 1), 1.0);
-        }
-    }
-    inverse
-}
-
 /// Fits a set, its scales moved to where the evidence is largest. `None` where the columns cannot be told apart at all.
 pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -> Option<Fit> {
     let blocks = &pool.blocks;
     let columns = columns(blocks, set);
-    let (g, b) = select(&whitened.gram, &columns);
+    let normal = Normal::new(blocks, whitened, set, &columns);
     let mut scales_rad: Vec<f64> = (0..set.len()).map(|n| start_rad.get(n).copied().unwrap_or(3e-5)).collect();
-    let mut solved = solve(&g, &b, &prior(blocks, set, &scales_rad))?;
+    let mut solved = normal.solve(&prior(blocks, set, &scales_rad))?;
     for _ in 0..8 {
-        let half = lower_inverse(&solved.cholesky);
+        let squares = normal.squares(&solved);
         let mut first = 1;
         let mut moved = 0.0_f64;
         for (scale, block) in scales_rad.iter_mut().zip(set) {
             let width = blocks[*block].width();
             // s² is what the amplitudes are expected to sum up to: |m|² + trace of their covariance.
-            let square: f64 =
-                (first..first + width).map(|n| solved.mean[n] * solved.mean[n] + half.column(n).norm_squared()).sum();
+            let square: f64 = squares[first..first + width].iter().sum();
             let next = square.sqrt().clamp(LEAST_SCALE_RAD, LARGEST_SCALE_RAD);
             moved = moved.max((next / *scale).ln().abs());
             *scale = next;
             first += width;
         }
-        solved = solve(&g, &b, &prior(blocks, set, &scales_rad))?;
+        solved = normal.solve(&prior(blocks, set, &scales_rad))?;
         if moved < 0.05 {
             break;
         }
     }
-    let half = lower_inverse(&solved.cholesky);
-    let covariance = half.transpose() * half;
+    let mean = normal.mean(&solved);
     let cost: f64 = set.iter().map(|block| SCALE_COST.min(0.5 + 2.0 / blocks[*block].width() as f64).max(0.3)).sum();
-    let signs: f64 = set
-        .iter()
-        .filter(|block| one_sided(&blocks[**block]))
-        .map(|block| {
-            let n = columns.iter().position(|c| *c == blocks[*block].columns.start).unwrap_or(0);
-            sign_evidence(solved.mean[n], covariance[(n, n)])
-        })
-        .sum();
-    Some(Fit {
-        set: set.to_vec(),
-        scales_rad,
-        columns,
-        mean: solved.mean,
-        covariance,
-        log_evidence: solved.log_evidence - cost + signs,
-    })
+    let half = solved.half();
+    let mut signs = 0.0;
+    for block in set.iter().map(|block| &blocks[*block]).filter(|block| one_sided(block)) {
+        let is_own = |n: &usize| columns[*n] == block.columns.start;
+        if let Some((n, column)) = normal.others.iter().copied().enumerate().find(|(_, n)| is_own(n)) {
+            signs += sign_evidence(mean[column], half.column(n).norm_squared());
+        }
+    }
+    Some(Fit { set: set.to_vec(), scales_rad, columns, mean, log_evidence: solved.log_evidence - cost + signs })
+}
+
+/// Covariance of a fit's amplitudes under the noise that it was made with.
+#[must_use]
+pub fn covariance(pool: &Pool, whitened: &Whitened, fit: &Fit) -> DMatrix<f64> {
+    let normal = Normal::new(&pool.blocks, whitened, &fit.set, &fit.columns);
+    let width = fit.columns.len();
+    // What could be fitted can be solved.
+    let solved = normal.solve(&prior(&pool.blocks, &fit.set, &fit.scales_rad));
+    solved.map_or_else(|| DMatrix::zeros(width, width), |solved| normal.covariance(&solved))
 }
 
 /// Log evidence of a fit's set at its scales under another noise, whose matrix holds the residual and the fit's columns only.
@@ -180,9 +137,12 @@ pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -
 pub(super) fn at_scales(pool: &Pool, whitened: &Whitened, fit: &Fit) -> f64 {
     let columns: Vec<usize> = (1..=fit.columns.len()).collect();
     let (g, b) = select(&whitened.gram, &columns);
-    let evidence =
-        solve(&g, &b, &prior(&pool.blocks, &fit.set, &fit.scales_rad)).map_or(f64::NEG_INFINITY, |s| s.log_evidence);
+    let evidence = log_evidence(g, b, &prior(&pool.blocks, &fit.set, &fit.scales_rad));
     evidence - 0.5 * whitened.log_det - 0.5 * whitened.gram[(RESIDUAL, RESIDUAL)]
+}
+
+fn log_evidence(gram: DMatrix<f64>, rhs: DVector<f64>, variances: &[f64]) -> f64 {
+    Normal::dense(gram, rhs).solve(variances).map_or(f64::NEG_INFINITY, |solved| solved.log_evidence)
 }
 
 fn one_sided(block: &Block) -> bool {
@@ -242,7 +202,7 @@ fn gain_of_wide(schur: &DMatrix<f64>, rhs: &DVector<f64>, d: usize) -> f64 {
     let logs: Vec<f64> = (0..WIDE_SCALES)
         .map(|n| {
             let scale = 2.0 * SMALLEST_SCALE_RAD * 4.0_f64.powi(n);
-            solve(schur, rhs, &vec![scale * scale / d as f64; d]).map_or(f64::NEG_INFINITY, |s| s.log_evidence)
+            log_evidence(schur.clone(), rhs.clone(), &vec![scale * scale / d as f64; d])
         })
         .collect();
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);

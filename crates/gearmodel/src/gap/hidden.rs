@@ -82,7 +82,7 @@ impl Engine<'_> {
         if !set.iter().any(levels) {
             return None;
         }
-        let others = self.pool.causes(&self.steady_set());
+        let others = self.steady_set();
         let mut before = f64::NEG_INFINITY;
         for _ in 0..MOST_BETWEEN {
             let with = |more: Option<&f64>| {
@@ -91,7 +91,7 @@ impl Engine<'_> {
                 steps(shape)
             };
             let tried = std::iter::once(with(None)).chain(self.grid.plan.starts_s.iter().map(|t| with(Some(t))));
-            let beside = self.beside(others.clone(), tried.collect())?;
+            let beside = self.beside(&others, tried.collect())?;
             let (best, gain) = beside.best()?;
             let Cause::Effect { shape, .. } = &beside.pool.blocks[best].cause else { return None };
             if gain < before + events::STEPS_COST_NATS[1] || *shape == times_s {
@@ -106,7 +106,7 @@ impl Engine<'_> {
     pub(super) fn look_for_what_runs_on(&mut self) -> bool {
         let (settling, walk) = Pattern::running_on(&self.grid.plan);
         let settling = settling.into_iter().map(Cause::Unknown).collect();
-        let Some(beside) = self.beside(self.pool.causes(&self.steady_set()), settling) else { return false };
+        let Some(beside) = self.beside(&self.steady_set(), settling) else { return false };
         let settles = beside.best().filter(|(_, gain)| *gain > 0.0);
         let settles = settles.map(|(block, _)| beside.pool.blocks[block].cause.clone());
         let rest = beside.pool.rest(&self.grid, &beside.fit.amplitudes());
@@ -129,11 +129,11 @@ impl Engine<'_> {
         let span_rev = self.grid.span_rev();
         let mut patterns = Pattern::wandering(span_rev);
         let mut step = 1.0;
-        let found = self.best.as_ref().map(|m| self.pool.causes(&m.fit.set)).unwrap_or_default();
+        let found = self.best.as_ref().map(|m| m.fit.set.clone()).unwrap_or_default();
         let mut best: Option<(Pattern, f64)> = None;
         for _ in 0..3 {
             let tried = patterns.iter().cloned().map(Cause::Unknown).collect();
-            let Some(beside) = self.beside(found.clone(), tried) else { return false };
+            let Some(beside) = self.beside(&found, tried) else { return false };
             for (block, gain) in &beside.gains {
                 if let Cause::Unknown(pattern) = &beside.pool.blocks[*block].cause
                     && best.as_ref().is_none_or(|(_, g)| gain > g)
@@ -160,10 +160,10 @@ impl Engine<'_> {
         !added.is_empty()
     }
 
-    /// What each of several causes would add to a set of others, in a pool of their own.
-    fn beside(&self, others: Vec<Cause>, tried: Vec<Cause>) -> Option<Beside> {
-        let mut pool = self.pool.beside(&self.grid);
-        let set = pool.add(&self.grid, self.rig, others);
+    /// What each of several causes would add to a set of blocks, in a pool of their own.
+    fn beside(&self, others: &[usize], tried: Vec<Cause>) -> Option<Beside> {
+        let mut pool = self.pool.only(&self.grid, others);
+        let set: Vec<usize> = (0..others.len()).collect();
         let tried = pool.add(&self.grid, self.rig, tried);
         let whitened = self.noise.whiten(&self.grid, &pool);
         let fit = evidence::fit(&pool, &whitened, &set, &[])?;
@@ -176,11 +176,10 @@ impl Engine<'_> {
     fn noise_with(&self, event: &Cause, rounds: usize) -> Option<Noise> {
         let steady = self.steady_set();
         let best = self.best.as_ref()?;
-        let mut causes = self.pool.causes(&steady);
-        causes.push(event.clone());
         // In a pool of its own: most events that are none fail here.
-        let mut few = self.pool.beside(&self.grid);
-        let own = few.add(&self.grid, self.rig, causes);
+        let mut few = self.pool.only(&self.grid, &steady);
+        few.add(&self.grid, self.rig, vec![event.clone()]);
+        let own: Vec<usize> = (0..few.blocks.len()).collect();
         let mut noise = self.noise.clone();
         // What passes for scatter holds its own amplitudes down until the scatter is less.
         for _ in 0..rounds {

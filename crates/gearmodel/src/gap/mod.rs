@@ -6,7 +6,7 @@
 //! | revolutions × angle bins | `grid` | residual and station of every place |
 //! | columns of all effects and unknown patterns | `pool`, `columns`, `unknown` | sums from which every fit is made |
 //! | what does not repeat | `noise` | covariance by order, revolution and run |
-//! | how probable is a set of effects | `evidence`, `search` | models with their posterior |
+//! | how probable is a set of effects | `normal`, `evidence`, `search` | models with their posterior |
 //! | tones, steps, knocks | `events`, `knocks` | what angle does not carry |
 //! | probabilities, groups | `attribute` | verdict |
 //! | the gap on runs not used for the fit | `shrink` | how far it closes |
@@ -42,6 +42,7 @@ mod interpolation;
 mod knocks;
 mod locate;
 mod next;
+mod normal;
 mod shrink;
 
 pub use diagnosis::Diagnosis;

@@ -6,7 +6,11 @@
 //! Z the waves at the places, V = σ²W⁻¹ + Z Λ Zᵀ (+ the same across a run), inverted by Woodbury's identity on the sums
 //! of the pool. Samples are not independent: treated as such, a null campaign shows false effects more often than not.
 
-use nalgebra::{Cholesky, DMatrix};
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use nalgebra::{Cholesky, DMatrix, Dyn, SymmetricEigen};
 
 use super::grid::Grid;
 use super::pool::Pool;
@@ -79,6 +83,32 @@ pub struct Whitened {
     pub gram: DMatrix<f64>,
     /// log det V + constant.
     pub log_det: f64,
+    /// Eigenvectors of wide blocks' own part, by their first column, once they are asked for.
+    bases: Mutex<HashMap<usize, Basis>>,
+}
+
+type Basis = Arc<SymmetricEigen<f64, Dyn>>;
+
+impl Whitened {
+    fn new(gram: DMatrix<f64>, log_det: f64) -> Self {
+        Self { gram, log_det, bases: Mutex::default() }
+    }
+
+    /// Of no column.
+    #[must_use]
+    pub fn empty() -> Self {
+        Self::new(DMatrix::zeros(0, 0), 0.0)
+    }
+
+    /// The directions in which the part of a block's columns is diagonal; worked out once.
+    pub(super) fn basis(&self, columns: &Range<usize>) -> Basis {
+        let mut bases = self.bases.lock().unwrap_or_else(PoisonError::into_inner);
+        let basis = bases.entry(columns.start).or_insert_with(|| {
+            let own = self.gram.view((columns.start, columns.start), (columns.len(), columns.len()));
+            Arc::new(SymmetricEigen::new(own.into_owned()))
+        });
+        Arc::clone(basis)
+    }
 }
 
 impl Noise {
@@ -271,7 +301,7 @@ impl WithinRuns {
                 rows.view_mut((run * WAVES, 0), (WAVES, p)).gemm(1.0, &passing.half, waves, 0.0);
             }
         }
-        Whitened { gram: &self.gram - super::gram::gram(&rows), log_det }
+        Whitened::new(&self.gram - super::gram::gram(&rows), log_det)
     }
 }
 

@@ -125,9 +125,9 @@ fn rows(cause: &Cause, rig: &Rig, stations: &[Station], width: usize) -> DMatrix
         Cause::Unknown(_) => Grain::Smooth,
     };
     let places = grain.places();
-    let take = |station: &Station, row: &mut [f64]| match cause {
-        Cause::Effect { effect, shape, .. } => effect.row(rig, shape, station, row),
-        Cause::Unknown(pattern) => pattern.row(station, row),
+    let mut take: Box<dyn FnMut(&Station, &mut [f64])> = match cause {
+        Cause::Effect { effect, shape, .. } => effect.rows(rig, shape),
+        Cause::Unknown(pattern) => Box::new(|station, row| pattern.row(station, row)),
     };
     for (number, station) in stations.iter().enumerate() {
         row.fill(0.0);
@@ -172,25 +172,34 @@ impl Pool {
     /// The residual and the zero, without blocks.
     #[must_use]
     pub fn new(grid: &Grid) -> Self {
-        Self::on(Arc::new(Base::new(grid)), grid)
-    }
-
-    /// An empty pool over the same grid, for trials.
-    #[must_use]
-    pub fn beside(&self, grid: &Grid) -> Self {
-        Self::on(Arc::clone(&self.base), grid)
-    }
-
-    fn on(base: Arc<Base>, grid: &Grid) -> Self {
         let mut pool = Self {
             blocks: Vec::new(),
             columns: Columns::default(),
             products: DMatrix::zeros(0, 0),
             waves: vec![DMatrix::zeros(WAVES, 0); grid.revolutions.len()],
-            base,
+            base: Arc::new(Base::new(grid)),
         };
         pool.append(grid, vec![Values::Places(grid.rho_rad.clone()), Values::Cells(vec![1.0; grid.cells.len()])]);
         pool
+    }
+
+    /// A pool of some of the blocks, in their order, for trials: it stays small.
+    #[must_use]
+    pub fn only(&self, grid: &Grid, blocks: &[usize]) -> Self {
+        let mut columns = vec![RESIDUAL, ZERO];
+        let mut few = Vec::new();
+        for block in blocks.iter().map(|number| &self.blocks[*number]) {
+            let first = columns.len();
+            columns.extend(block.columns.clone());
+            few.push(Block { columns: first..columns.len(), ..block.clone() });
+        }
+        Self {
+            blocks: few,
+            columns: self.columns.only(grid, &columns),
+            products: self.products.select_rows(&columns).select_columns(&columns),
+            waves: self.waves.iter().map(|waves| waves.select_columns(&columns)).collect(),
+            base: Arc::clone(&self.base),
+        }
     }
 
     /// Columns in all.
@@ -256,9 +265,9 @@ impl Pool {
         self.blocks.truncate(first);
         self.columns.keep(grid, old, range.clone());
         let columns: Vec<usize> = (0..old).chain(range).collect();
-        self.products = DMatrix::from_fn(columns.len(), columns.len(), |m, n| self.products[(columns[m], columns[n])]);
+        self.products = self.products.select_rows(&columns).select_columns(&columns);
         for waves in &mut self.waves {
-            *waves = DMatrix::from_fn(waves.nrows(), columns.len(), |m, n| waves[(m, columns[n])]);
+            *waves = waves.select_columns(&columns);
         }
         let mut block = kept?;
         block.columns = old..old + block.columns.len();

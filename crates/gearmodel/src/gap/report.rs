@@ -445,11 +445,12 @@ impl Engine<'_> {
             .sum()
         };
         let mean = |n: usize| best.fit.mean[n];
+        let of_amplitudes = evidence::covariance(&self.pool, &self.whitened, &best.fit);
         let mut explained = 0.0;
         for (n, b) in best.fit.set.iter().enumerate() {
             let place = best.fit.place(&self.pool, n);
             let share = covariance(place.clone(), &mean) / reducible;
-            let deviation = place.clone().map(|m| best.fit.covariance[(m, m)]).sum::<f64>().sqrt()
+            let deviation = place.clone().map(|m| of_amplitudes[(m, m)]).sum::<f64>().sqrt()
                 * 2.0
                 * (share.abs() / reducible).sqrt();
             explained += share;
