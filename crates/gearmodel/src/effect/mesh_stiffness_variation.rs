@@ -58,7 +58,8 @@ impl Effect for MeshStiffnessVariation {
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
         let weight = if let [duty, start] = shape[..] {
-            if (at.pitches - start).rem_euclid(1.0) < duty { 1.0 - duty } else { -duty }
+            let from_start = at.pitches - start;
+            if from_start - from_start.floor() < duty { 1.0 - duty } else { -duty }
         } else {
             f64::from(u8::from(rig.teeth_in_contact(at, 0.0).count() < 2)) - rig.single_pair_duty(at)
         };

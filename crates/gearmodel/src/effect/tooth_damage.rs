@@ -66,10 +66,8 @@ impl Effect for ToothDamage {
             return;
         }
         let teeth = f64::from(rig.pair().teeth().0);
-        let mut v = (at.pitches - tooth).rem_euclid(teeth);
-        if v > 0.5 * teeth {
-            v -= teeth;
-        }
+        let from_tooth = at.pitches - tooth;
+        let v = from_tooth - teeth * (from_tooth / teeth + 0.5).floor();
         if v.abs() < width {
             row[0] = -at.sense * (FRAC_PI_2 * v / width).cos().powi(2) / at.arm_mm;
         }

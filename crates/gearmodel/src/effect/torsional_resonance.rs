@@ -51,16 +51,33 @@ fn through(orders: &MeshOrders, number: f64, x: f64, zeta: f64) -> Vec<[f64; 2]>
 
 /// Σ c_n e^{jnθ} from n = `first` on.
 fn sum_of_orders(first: i32, amplitudes: &[[f64; 2]], theta_rad: f64) -> (f64, f64) {
-    // Horner's rule in e^{jθ}.
-    let (sin, cos) = theta_rad.sin_cos();
-    let (mut re, mut im) = (0.0, 0.0);
-    for [a, b] in amplitudes.iter().rev() {
-        (re, im) = (re * cos - im * sin + a, re * sin + im * cos + b);
+    let (step_sin, step_cos) = theta_rad.sin_cos();
+    // Horner's rule in e^{jLθ}, for every L-th order on its own: the sums do not wait for one another.
+    let (mut sin, mut cos) = (step_sin, step_cos);
+    for _ in 0..LANES.ilog2() {
+        (sin, cos) = (2.0 * sin * cos, cos * cos - sin * sin);
     }
-    let (sin, cos) = (f64::from(first) * theta_rad).sin_cos();
-    (re * cos - im * sin, re * sin + im * cos)
+    let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+    for group in amplitudes.chunks(LANES).rev() {
+        let mut next = [[0.0; 2]; LANES];
+        next[..group.len()].copy_from_slice(group);
+        for lane in 0..LANES {
+            let [a, b] = next[lane];
+            (re[lane], im[lane]) = (re[lane] * cos - im[lane] * sin + a, re[lane] * sin + im[lane] * cos + b);
+        }
+    }
+    let (mut sum_re, mut sum_im) = (0.0, 0.0);
+    let (mut sin, mut cos) = (f64::from(first) * theta_rad).sin_cos();
+    for (re, im) in re.into_iter().zip(im) {
+        sum_re += re * cos - im * sin;
+        sum_im += re * sin + im * cos;
+        (cos, sin) = (cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin);
+    }
+    (sum_re, sum_im)
 }
 
+/// Orders summed side by side, a power of 2.
+const LANES: usize = 8;
 /// Once a turn of the driver.
 const TURN: f64 = 0.0;
 /// At the tooth mesh.
