@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use super::evidence::{Fit, WIDE, fit, scan};
 use super::noise::Whitened;
 use super::pool::{Cause, Pool};
@@ -18,6 +20,9 @@ const LARGEST_SET: usize = 8;
 const LARGEST: f64 = 3.0;
 /// How many of the best candidates are tried exactly.
 const TRIED: usize = 5;
+/// How far below the present model a scan may expect a set that is fitted: on the climb, and where all that competes is to be seen.
+const CLIMBING_NATS: f64 = 3.0;
+const COMPETING_NATS: f64 = 9.0;
 /// Candidates kept of a scan.
 const MOST_RANKED: usize = 60;
 /// Starts beside the empty set.
@@ -87,25 +92,32 @@ impl<'a> Search<'a> {
     }
 
     /// The model of a set; fitted once.
-    pub fn model(&mut self, mut set: Vec<usize>, near: Option<&Fit>) -> Option<Model> {
-        set.sort_unstable();
-        if let Some(known) = self.seen.get(&set) {
-            return known.clone();
-        }
+    pub fn model(&mut self, set: Vec<usize>, near: Option<&Fit>) -> Option<Model> {
+        self.models_of(vec![set], near).pop()
+    }
+
+    /// The models of sets, each fitted once, on all cores; those that cannot be fitted are left out.
+    fn models_of(&mut self, mut sets: Vec<Vec<usize>>, near: Option<&Fit>) -> Vec<Model> {
+        sets.iter_mut().for_each(|set| set.sort_unstable());
+        let mut fresh: Vec<Vec<usize>> = sets.iter().filter(|set| !self.seen.contains_key(*set)).cloned().collect();
+        fresh.sort_unstable();
+        fresh.dedup();
+        let fitted: Vec<Option<Model>> = fresh.par_iter().map(|set| self.fit(set, near)).collect();
+        self.seen.extend(fresh.into_iter().zip(fitted));
+        sets.iter().filter_map(|set| self.seen[set].clone()).collect()
+    }
+
+    fn fit(&self, set: &[usize], near: Option<&Fit>) -> Option<Model> {
         let start: Vec<f64> = set
             .iter()
             .map(|b| {
                 near.and_then(|fit| fit.set.iter().position(|x| x == b).map(|n| fit.scales_rad[n])).unwrap_or(3e-5)
             })
             .collect();
-        let fitted = fit(self.pool, self.whitened, &set, &start)
-            .filter(|fit| (0..set.len()).all(|n| fit.rms_rad(self.pool, n) < self.largest_rad));
-        let model = fitted.map(|fit| {
-            let prior: f64 = set.iter().map(|b| self.priors[*b]).sum();
-            Model { score: self.offset + fit.log_evidence + prior, fit }
-        });
-        self.seen.insert(set, model.clone());
-        model
+        let fit = fit(self.pool, self.whitened, set, &start)?;
+        let possible = (0..set.len()).all(|n| fit.rms_rad(self.pool, n) < self.largest_rad);
+        let prior: f64 = set.iter().map(|b| self.priors[*b]).sum();
+        possible.then(|| Model { score: self.offset + fit.log_evidence + prior, fit })
     }
 
     /// Candidates that may join a set: one shape of an effect at a time.
@@ -140,67 +152,49 @@ impl<'a> Search<'a> {
         best
     }
 
+    /// Models of sets about a model: some `bases`, and each with the additions that might come within `room` of the model.
+    fn about(
+        &mut self,
+        model: &Model,
+        bases: Vec<Vec<usize>>,
+        allowed: Allowed,
+        tried: usize,
+        room: f64,
+    ) -> Vec<Model> {
+        let mut models = self.models_of(bases, Some(&model.fit));
+        let mut sets = Vec::new();
+        for base in models.iter().filter(|base| base.fit.set.len() < LARGEST_SET) {
+            let additions = self.additions(base, allowed, tried).into_iter();
+            let near = additions.filter(|(_, score)| *score > model.score - room);
+            sets.extend(near.map(|(block, _)| with(&base.fit.set, block)));
+        }
+        models.extend(self.models_of(sets, Some(&model.fit)));
+        models
+    }
+
     /// Climbs from a set to where no addition, removal or swap raises the posterior.
     pub fn climb(&mut self, start: Vec<usize>, allowed: Allowed) -> Option<Model> {
         let mut best = self.model(start, None)?;
         for _ in 0..40 {
-            let mut next = best.clone();
-            let mut consider = |search: &mut Self, set: Vec<usize>, near: &Fit| {
-                if let Some(model) = search.model(set, Some(near))
-                    && model.score > next.score + 1e-6
-                {
-                    next = model;
-                }
-            };
-            if best.fit.set.len() < LARGEST_SET {
-                for (block, score) in self.additions(&best, allowed, TRIED) {
-                    if score > best.score - 3.0 {
-                        consider(self, with(&best.fit.set, block), &best.fit);
-                    }
-                }
-            }
-            for n in 0..best.fit.set.len() {
-                let mut set = best.fit.set.clone();
-                set.remove(n);
-                let Some(fewer) = self.model(set.clone(), Some(&best.fit)) else { continue };
-                consider(self, set.clone(), &best.fit);
-                for (block, score) in self.additions(&fewer, allowed, TRIED) {
-                    if score > best.score - 3.0 {
-                        consider(self, with(&set, block), &best.fit);
-                    }
-                }
-            }
-            if next.score <= best.score + 1e-6 {
+            let set = &best.fit.set;
+            let mut next = self.higher(&best, fewer_by_one(set).chain([set.clone()]).collect(), allowed);
+            if next.is_none() {
                 // At the top of one hill: one effect may stand for two that together look like it.
-                next = self.one_for_two(&best, allowed).unwrap_or(next);
+                next = self.higher(&best, fewer_by_two(&best.fit.set), allowed);
             }
-            if next.score <= best.score + 1e-6 {
-                break;
+            match next {
+                Some(next) => best = next,
+                None => break,
             }
-            best = next;
         }
         Some(best)
     }
 
-    /// The best model with one block in place of two, where that is better.
-    fn one_for_two(&mut self, best: &Model, allowed: Allowed) -> Option<Model> {
-        let mut better: Option<Model> = None;
-        let set = &best.fit.set;
-        for m in 0..set.len() {
-            for n in 0..m {
-                let rest = without(set, &[set[m], set[n]]);
-                let Some(fewer) = self.model(rest.clone(), Some(&best.fit)) else { continue };
-                for (block, score) in self.additions(&fewer, allowed, TRIED) {
-                    if score > best.score - 3.0
-                        && let Some(model) = self.model(with(&rest, block), Some(&best.fit))
-                        && model.score > better.as_ref().map_or(best.score + 1e-6, |b| b.score)
-                    {
-                        better = Some(model);
-                    }
-                }
-            }
-        }
-        better
+    /// The best model about another, where it is better.
+    fn higher(&mut self, best: &Model, bases: Vec<Vec<usize>>, allowed: Allowed) -> Option<Model> {
+        let models = self.about(best, bases, allowed, TRIED, CLIMBING_NATS);
+        let highest = models.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))?;
+        (highest.score > best.score + 1e-6).then_some(highest)
     }
 
     /// The best model: the library first from several starts, then with patterns outside it.
@@ -238,22 +232,8 @@ impl<'a> Search<'a> {
 
     /// Looks around a model so that what competes with it has been seen: additions, removals, swaps.
     pub fn explore(&mut self, best: &Model) {
-        let room = 9.0;
-        for (block, score) in self.additions(best, Allowed::All, 60) {
-            if score > best.score - room {
-                self.model(with(&best.fit.set, block), Some(&best.fit));
-            }
-        }
-        for n in 0..best.fit.set.len() {
-            let mut set = best.fit.set.clone();
-            set.remove(n);
-            let Some(fewer) = self.model(set.clone(), Some(&best.fit)) else { continue };
-            for (block, score) in self.additions(&fewer, Allowed::All, 40) {
-                if score > best.score - room {
-                    self.model(with(&set, block), Some(&best.fit));
-                }
-            }
-        }
+        self.about(best, vec![best.fit.set.clone()], Allowed::All, 60, COMPETING_NATS);
+        self.about(best, fewer_by_one(&best.fit.set).collect(), Allowed::All, 40, COMPETING_NATS);
     }
 
     /// All models seen, best first.
@@ -265,8 +245,13 @@ impl<'a> Search<'a> {
     }
 }
 
-fn without(set: &[usize], blocks: &[usize]) -> Vec<usize> {
-    set.iter().copied().filter(|b| !blocks.contains(b)).collect()
+fn fewer_by_one(set: &[usize]) -> impl Iterator<Item = Vec<usize>> + '_ {
+    set.iter().map(|out| set.iter().copied().filter(|b| b != out).collect())
+}
+
+fn fewer_by_two(set: &[usize]) -> Vec<Vec<usize>> {
+    let pairs = (0..set.len()).flat_map(|m| (0..m).map(move |n| [set[m], set[n]]));
+    pairs.map(|out| set.iter().copied().filter(|b| !out.contains(b)).collect()).collect()
 }
 
 fn with(set: &[usize], block: usize) -> Vec<usize> {
