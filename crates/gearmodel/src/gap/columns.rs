@@ -22,7 +22,7 @@ enum Slot {
 }
 
 /// Columns, kept by kind one after the other.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Columns {
     slots: Vec<Slot>,
     in_cells: Vec<f64>,
@@ -74,19 +74,6 @@ impl Columns {
         match self.slots[column] {
             Slot::Cells(n) => Values::Cells(self.cells(grid).column(n).iter().copied().collect()),
             Slot::Places(n) => Values::Places(self.places(grid).column(n).iter().copied().collect()),
-        }
-    }
-
-    /// Keeps the first columns and some of those after them.
-    pub(super) fn keep(&mut self, grid: &Grid, first: usize, others: std::ops::Range<usize>) {
-        let kept: Vec<Values> = others.map(|column| self.values(grid, column)).collect();
-        self.slots.truncate(first);
-        let cells = self.slots.iter().filter(|slot| matches!(slot, Slot::Cells(_))).count();
-        self.in_cells.truncate(cells * grid.cells.len());
-        self.in_places.truncate((first - cells) * grid.places.len());
-        self.sums.truncate((first - cells) * grid.cells.len());
-        for values in kept {
-            self.push(grid, values);
         }
     }
 

@@ -409,12 +409,11 @@ impl<'a> Engine<'a> {
             .map(|n| best.fit.set[n])
             .collect();
         let mut few = self.pool.only(&self.grid, &large);
-        let mut set: Vec<usize> = (0..large.len()).collect();
         let mut changed = false;
         for step in SHARPENING_STEPS {
             let mut moved = false;
-            for n in 0..set.len() {
-                moved |= self.sharpen_block(&mut few, &mut set, n, step);
+            for _ in 0..large.len() {
+                moved |= self.sharpen_first(&mut few, step);
             }
             changed |= moved;
             if !moved && step < 0.2 {
@@ -422,10 +421,9 @@ impl<'a> Engine<'a> {
             }
         }
         if changed {
-            let shaped = few.causes(&set);
+            let shaped: Vec<Cause> = few.blocks.into_iter().map(|block| block.cause).collect();
             let known: Vec<Option<usize>> = shaped.iter().map(|cause| self.block_of(cause)).collect();
-            let fresh =
-                shaped.iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(cause, _)| cause.clone()).collect();
+            let fresh = shaped.into_iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(cause, _)| cause).collect();
             let mut added = self.pool.add(&self.grid, self.rig, fresh).into_iter();
             self.large = Some(known.into_iter().filter_map(|k| k.or_else(|| added.next())).collect());
         }
@@ -441,13 +439,14 @@ impl<'a> Engine<'a> {
         })
     }
 
-    /// Tries the shapes about that of block `n` of a set, and puts the best in its place.
-    fn sharpen_block(&self, few: &mut Pool, set: &mut [usize], n: usize, step: f64) -> bool {
+    /// Tries the shapes about that of a pool's first block, and puts the best behind the others; true where that is another.
+    fn sharpen_first(&self, few: &mut Pool, step: f64) -> bool {
+        let all: Vec<usize> = (0..few.blocks.len()).collect();
         let whitened = self.noise.whiten(&self.grid, few);
-        let Some(now) = evidence::fit(few, &whitened, set, &[]) else { return false };
-        let fresh: Vec<Cause> = match few.blocks[set[n]].cause.clone() {
+        let Some(now) = evidence::fit(few, &whitened, &all, &[]) else { return false };
+        let fresh: Vec<Cause> = match few.blocks[0].cause.clone() {
             Cause::Effect { effect, number, shape, cost_nats } => {
-                let refined = effect.refine(self.rig, &shape, &amplitudes_of(few, &whitened, &now, n).beta);
+                let refined = effect.refine(self.rig, &shape, &amplitudes_of(few, &whitened, &now, 0).beta);
                 let shapes = effect.neighbours(&shape, step).into_iter().chain(refined);
                 shapes.map(|shape| Cause::Effect { effect, number, shape, cost_nats }).collect()
             }
@@ -456,29 +455,21 @@ impl<'a> Engine<'a> {
                 nearer.into_iter().map(Cause::Unknown).collect()
             }
         };
-        if fresh.is_empty() {
-            return false;
-        }
-        let tried = few.add(&self.grid, self.rig, fresh);
-        let whitened = self.noise.whiten(&self.grid, few);
-        let mut winner = (now.log_evidence + SHARPER_NATS, set[n]);
-        for block in &tried {
-            let mut other = set.to_vec();
-            other[n] = *block;
-            if let Some(fit) = evidence::fit(few, &whitened, &other, &now.scales_rad)
-                && fit.log_evidence > winner.0
-            {
-                winner = (fit.log_evidence, *block);
-            }
-        }
-        // Only the winner stays.
-        match few.keep_of(&self.grid, &tried, winner.1) {
-            Some(kept) => {
-                set[n] = kept;
-                true
-            }
-            None => false,
-        }
+        let others = few.only(&self.grid, &all[1..]);
+        let start_rad: Vec<f64> = now.scales_rad[1..].iter().chain(&now.scales_rad[..1]).copied().collect();
+        let best = fresh
+            .into_par_iter()
+            .filter_map(|cause| {
+                let mut tried = others.clone();
+                tried.add(&self.grid, self.rig, vec![cause]).first()?;
+                let fit = evidence::fit(&tried, &self.noise.whiten(&self.grid, &tried), &all, &start_rad)?;
+                Some((fit.log_evidence, tried))
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(log_evidence, _)| *log_evidence > now.log_evidence + SHARPER_NATS);
+        let moved = best.is_some();
+        *few = best.map_or_else(|| few.only(&self.grid, &[&all[1..], &all[..1]].concat()), |(_, tried)| tried);
+        moved
     }
 
     /// Amplitudes of block `n` of a model in the effect's own units.

@@ -11,6 +11,7 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Cholesky, DMatrix, Dyn, SymmetricEigen};
+use rayon::prelude::*;
 
 use super::grid::Grid;
 use super::pool::Pool;
@@ -75,6 +76,8 @@ pub struct Noise {
     pub run_ratio: [f64; 2],
     /// Independent differences from which the revolutions' scatter was estimated; 0 where it was assumed.
     pub freedom: f64,
+    /// How the waves of every revolution are whitened.
+    revolutions: Arc<Vec<Option<Passing>>>,
 }
 
 /// Everything a fit needs under one noise.
@@ -177,7 +180,10 @@ impl Noise {
         // A level that changes from turn to turn changes within them too.
         order_rad2[ORDERS + 1] = RAMP * order_rad2[0];
         order_rad2[ORDERS + 2] = RAMP * order_rad2[1];
-        Self { white_rad2, order_rad2, run_ratio: FIRST_RUN_RATIO, freedom }
+        let wave_rad2 = wave_rad2(&order_rad2);
+        let passing = |k: &DMatrix<f64>| Passing::new(&(k / white_rad2), &wave_rad2);
+        let revolutions = Arc::new(pool.wave_products().par_iter().map(passing).collect());
+        Self { white_rad2, order_rad2, run_ratio: FIRST_RUN_RATIO, freedom, revolutions }
     }
 
     /// RMS of what does not repeat, as a sample shows it, rad.
@@ -194,26 +200,21 @@ impl Noise {
         self.within_runs(grid, pool, None).between_runs(self.run_ratio)
     }
 
-    /// Variance of every wave between revolutions, rad².
-    fn wave_rad2(&self) -> Vec<f64> {
-        (0..WAVES).map(|w| self.order_rad2[kind(w)].max(LEAST_SCATTER_RAD * LEAST_SCATTER_RAD)).collect()
-    }
-
-    /// How the waves of a revolution with ZᵀWZ = `wave_products` are whitened.
-    pub(super) fn revolution(&self, wave_products: &DMatrix<f64>) -> Option<Passing> {
-        Passing::new(&(wave_products / self.white_rad2), &self.wave_rad2())
+    /// How the waves of a revolution are whitened.
+    pub(super) fn revolution(&self, number: usize) -> Option<&Passing> {
+        self.revolutions[number].as_ref()
     }
 
     /// How what revolutions pass on to their run is whitened there; `left` is the sum of theirs.
     pub(super) fn run(&self, left: &DMatrix<f64>) -> Option<Passing> {
-        Passing::new(left, &between(&self.wave_rad2(), self.run_ratio))
+        Passing::new(left, &between(&wave_rad2(&self.order_rad2), self.run_ratio))
     }
 
     /// Everything that does not depend on the scatter between runs, of all columns or of some.
     #[must_use]
     pub(super) fn within_runs(&self, grid: &Grid, pool: &Pool, only: Option<&[usize]>) -> WithinRuns {
         let precision = 1.0 / self.white_rad2;
-        let wave_rad2 = self.wave_rad2();
+        let wave_rad2 = wave_rad2(&self.order_rad2);
         let mut gram = match only {
             None => pool.products.clone(),
             Some(columns) => pool.products.select_rows(columns).select_columns(columns),
@@ -226,9 +227,7 @@ impl Noise {
         let mut waves = vec![DMatrix::zeros(WAVES, p); runs];
         let mut rows = DMatrix::zeros(grid.revolutions.len() * WAVES, p);
         for (number, revolution) in grid.revolutions.iter().enumerate() {
-            let Some(passing) = Passing::new(&(&pool.wave_products()[number] * precision), &wave_rad2) else {
-                continue;
-            };
+            let Some(passing) = self.revolution(number) else { continue };
             log_det += passing.log_det;
             let c = match only {
                 None => &pool.waves[number] * precision,
@@ -243,12 +242,18 @@ impl Noise {
     }
 }
 
+/// Variance of every wave between revolutions, rad².
+fn wave_rad2(order_rad2: &[f64; KINDS]) -> Vec<f64> {
+    (0..WAVES).map(|w| order_rad2[kind(w)].max(LEAST_SCATTER_RAD * LEAST_SCATTER_RAD)).collect()
+}
+
 /// Variance of every wave between runs.
 fn between(wave_rad2: &[f64], run_ratio: [f64; 2]) -> Vec<f64> {
     wave_rad2.iter().enumerate().map(|(n, l)| l * run_ratio[usize::from(n > 0)].max(1e-9)).collect()
 }
 
 /// Woodbury's identity at one level: K = ZᵀV⁻¹Z of what lies below, Λ the waves' own variance, S = (Λ⁻¹ + K)⁻¹.
+#[derive(Debug)]
 pub(super) struct Passing {
     /// L⁻¹ with LLᵀ = Λ⁻¹ + K: what a column with ZᵀV⁻¹x = c loses is |L⁻¹c|².
     pub half: DMatrix<f64>,

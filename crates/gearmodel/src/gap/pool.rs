@@ -68,6 +68,7 @@ impl Block {
 }
 
 /// All blocks with their sums. Column 0 is the residual, column 1 the free zero.
+#[derive(Clone)]
 pub struct Pool {
     /// Blocks.
     pub blocks: Vec<Block>,
@@ -254,25 +255,6 @@ impl Pool {
         }
         self.append(grid, all);
         numbers
-    }
-
-    /// Drops the blocks that were added last, all but one of them; returns its new number where it is one of these.
-    pub fn keep_of(&mut self, grid: &Grid, last: &[usize], keep: usize) -> Option<usize> {
-        let first = *last.first()?;
-        let old = self.blocks[first].columns.start;
-        let kept = last.contains(&keep).then(|| self.blocks[keep].clone());
-        let range = kept.as_ref().map_or(old..old, |block| block.columns.clone());
-        self.blocks.truncate(first);
-        self.columns.keep(grid, old, range.clone());
-        let columns: Vec<usize> = (0..old).chain(range).collect();
-        self.products = self.products.select_rows(&columns).select_columns(&columns);
-        for waves in &mut self.waves {
-            *waves = waves.select_columns(&columns);
-        }
-        let mut block = kept?;
-        block.columns = old..old + block.columns.len();
-        self.blocks.push(block);
-        Some(first)
     }
 
     fn unit_columns(&self, grid: &Grid, rig: &Rig, cause: &Cause) -> Option<(Vec<Values>, DMatrix<f64>)> {

@@ -83,7 +83,7 @@ impl HeldOut {
         for (number, (revolution, square)) in grid.revolutions.iter().zip(&squares).enumerate() {
             let unit = if by_run { revolution.run } else { number };
             let c = pool.waves[number].select_columns(&all) * precision;
-            if let Some(passing) = noise.revolution(&pool.wave_products()[number]) {
+            if let Some(passing) = noise.revolution(number) {
                 let lost = &passing.half * &c;
                 grams[unit] += square * precision - lost.transpose() * &lost;
                 run_sums[unit].0 += &passing.left;
