@@ -115,6 +115,9 @@ impl Parameter {
     }
 }
 
+/// Writes the row of a station.
+pub type Rows<'a> = Box<dyn FnMut(&Station, &mut [f64]) + 'a>;
+
 /// An effect of the library.
 pub trait Effect: Sync {
     /// Canonical name.
@@ -160,7 +163,7 @@ pub trait Effect: Sync {
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]);
 
     /// [`Effect::row`] for station after station, with what they share worked out once.
-    fn rows<'a>(&'a self, rig: &'a Rig, shape: &'a Shape) -> Box<dyn FnMut(&Station, &mut [f64]) + 'a> {
+    fn rows<'a>(&'a self, rig: &'a Rig, shape: &'a Shape) -> Rows<'a> {
         Box::new(move |at, row| self.row(rig, shape, at, row))
     }
 

@@ -15,7 +15,7 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, MeshOrders, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
+    Carrier, Effect, Estimate, Given, Grain, MeshOrders, Parameter, Parity, Plan, Rig, Rows, Shape, Signature, Stated,
     StatedEffect, StatedError, Station, stated,
 };
 
@@ -207,7 +207,7 @@ impl Effect for TorsionalResonance {
         self.rows(rig, shape)(at, row);
     }
 
-    fn rows<'a>(&'a self, rig: &'a Rig, shape: &'a Shape) -> Box<dyn FnMut(&Station, &mut [f64]) + 'a> {
+    fn rows<'a>(&'a self, rig: &'a Rig, shape: &'a Shape) -> Rows<'a> {
         let [kind, f_hz, zeta, ref rest @ ..] = shape[..] else { return Box::new(|_, _| ()) };
         let number = rest.first().copied().unwrap_or(0.0);
         let orders = rig.mesh_orders();

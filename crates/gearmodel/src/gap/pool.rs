@@ -15,7 +15,7 @@ use super::gram;
 use super::grid::Grid;
 use super::noise::WAVES;
 use super::unknown::Pattern;
-use crate::effect::{Effect, Grain, Rig, Shape, Station};
+use crate::effect::{Effect, Grain, Rig, Rows, Shape, Station};
 
 /// What a block of columns stands for.
 #[derive(Clone)]
@@ -126,7 +126,7 @@ fn rows(cause: &Cause, rig: &Rig, stations: &[Station], width: usize) -> DMatrix
         Cause::Unknown(_) => Grain::Smooth,
     };
     let places = grain.places();
-    let mut take: Box<dyn FnMut(&Station, &mut [f64])> = match cause {
+    let mut take: Rows<'_> = match cause {
         Cause::Effect { effect, shape, .. } => effect.rows(rig, shape),
         Cause::Unknown(pattern) => Box::new(|station, row| pattern.row(station, row)),
     };

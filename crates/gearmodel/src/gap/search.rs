@@ -117,7 +117,7 @@ impl<'a> Search<'a> {
         let fit = fit(self.pool, self.whitened, set, &start)?;
         let possible = (0..set.len()).all(|n| fit.rms_rad(self.pool, n) < self.largest_rad);
         let prior: f64 = set.iter().map(|b| self.priors[*b]).sum();
-        possible.then(|| Model { score: self.offset + fit.log_evidence + prior, fit })
+        possible.then_some(Model { score: self.offset + fit.log_evidence + prior, fit })
     }
 
     /// Candidates that may join a set: one shape of an effect at a time.
