@@ -21,12 +21,17 @@ use std::f64::consts::TAU;
 /// What a step costs on the way through the sectors, nats: its place is open.
 const STEP_NATS: f64 = 4.0;
 /// What steps cost as an effect, nats: to look for them, and each, whose place was chosen to a fraction of a degree.
-pub(super) const STEPS_COST_NATS: [f64; 2] = [8.0, 6.5];
+const STEPS_COST_NATS: [f64; 2] = [8.0, 6.5];
+/// Steps up to which those at the edges of runs are moved off them: more speak for one another.
+const FEW_STEPS: usize = 3;
 /// Most single steps of any size looked for, and the evidence from which one is taken into the pool, nats.
 const SINGLE_STEPS: usize = 3;
 const SINGLE_STEP_NATS: f64 = 14.0;
 /// Evidence from which steps are taken into the pool, nats.
 const STEPS_FOUND_NATS: f64 = 8.0;
+/// What the time of such a step costs, nats, in a run and between two: something happens as readily in one of the few pauses.
+const IN_RUN_NATS: f64 = 6.0;
+const IN_PAUSE_NATS: f64 = 3.0;
 /// Sectors a revolution.
 const SECTORS: usize = 12;
 /// Most steps followed, and most from one sector to the next.
@@ -59,6 +64,12 @@ pub struct Events {
     pub steps: Vec<Vec<f64>>,
 }
 
+/// What so many steps cost as an effect, nats: which of the places came first does not matter.
+pub(super) fn steps_cost_nats(steps: usize) -> f64 {
+    let orders: f64 = (1..=steps).map(|n| (n as f64).ln()).sum();
+    STEPS_COST_NATS[0] + STEPS_COST_NATS[1] * steps as f64 - orders
+}
+
 /// Looks for steps in what a model (column, amplitude) leaves; `steady` is the same without what accumulates, which could
 /// have taken the steps for a drift.
 #[must_use]
@@ -68,8 +79,11 @@ pub fn find(grid: &Grid, pool: &Pool, noise: &Noise, amplitudes: &[(usize, f64)]
     let mut look = |rest: &[f64]| {
         let sectors = sectors(grid, noise, rest);
         for tied in [false, true] {
-            if let Some((times_s, size_rad)) = find_steps(&sectors, tied) {
-                let times_s = sharpen(grid, rest, &times_s, size_rad);
+            for (times_s, size_rad) in find_steps(&sectors, tied) {
+                let mut times_s = sharpen(grid, rest, &times_s, size_rad);
+                if times_s.len() <= FEW_STEPS {
+                    times_s.iter_mut().for_each(|time_s| *time_s = off_the_edges(grid, *time_s));
+                }
                 if !steps.contains(&times_s) {
                     steps.push(times_s);
                 }
@@ -77,45 +91,97 @@ pub fn find(grid: &Grid, pool: &Pool, noise: &Noise, amplitudes: &[(usize, f64)]
         }
     };
     look(&rest);
+    let mut patterns = single_steps(grid, noise, &rest);
     if steady.len() < amplitudes.len() {
-        look(&pool.rest(grid, steady));
+        let rest = pool.rest(grid, steady);
+        look(&rest);
+        patterns.extend(single_steps(grid, noise, &rest));
     }
-    Events { patterns: single_steps(grid, noise, &rest), steps }
+    Events { patterns, steps }
 }
 
-/// Steps of any size, one after the other, each where it takes most off the sectors' residual.
+/// A step's time, moved to between two runs where it stands so near the end of one that it would only take off what is there.
+fn off_the_edges(grid: &Grid, time_s: f64) -> f64 {
+    let starts_s = &grid.plan.starts_s;
+    let run = starts_s.partition_point(|start_s| *start_s <= time_s);
+    let begins_s = run.checked_sub(1).map(|n| starts_s[n]);
+    let (Some(begins_s), Some(next_s)) = (begins_s, starts_s.get(run)) else { return time_s };
+    let speed = grid.places.iter().find(|place| place.run + 1 == run).map_or(0.0, |place| place.speed_rad_per_s.abs());
+    let sector_s = TAU / SECTORS as f64 / speed;
+    let last_s = grid.places.iter().filter(|place| place.run + 1 == run).map(|p| p.time_s).fold(begins_s, f64::max);
+    if time_s + sector_s > last_s {
+        *next_s
+    } else if time_s - sector_s < begins_s {
+        begins_s
+    } else {
+        time_s
+    }
+}
+
+/// Steps of any size, one after the other, each where it takes most off the sectors' residual; one that is undone later counts as two.
 fn single_steps(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Pattern> {
     let sectors = sectors(grid, noise, rest);
-    // Neighbouring sectors of a turn share its level: as many independent values as half turns.
-    let share = 2.0 / SECTORS as f64;
     let mut left: Vec<f64> = sectors.iter().map(|s| s.mean_rad).collect();
     let mut found = Vec::new();
     for _ in 0..SINGLE_STEPS {
-        let total: f64 = sectors.iter().map(|s| 1.0 / s.variance_rad2).sum();
-        let sum: f64 = sectors.iter().zip(&left).map(|(s, y)| y / s.variance_rad2).sum();
-        let (mut after, mut after_sum) = (total, sum);
-        let mut best = (0.0, 0, 0.0);
-        for (n, (sector, y)) in sectors.iter().zip(&left).enumerate() {
-            if n > 0 {
-                let before = total - after;
-                let step_rad = after_sum / after - (sum - after_sum) / before;
-                let gain = 0.5 * share * step_rad * step_rad * after * before / total;
-                if gain > best.0 {
-                    best = (gain, n, step_rad);
-                }
-            }
-            after -= 1.0 / sector.variance_rad2;
-            after_sum -= y / sector.variance_rad2;
-        }
-        let (gain, at, step_rad) = best;
-        if gain < SINGLE_STEP_NATS {
+        let sums = Sums::new(&sectors, &left);
+        let end = sectors.len();
+        let stays = (1..end).map(|from| sums.stretch(from, end));
+        let goes_back = (1..end).flat_map(|from| (from + SECTORS / 2..end).map(move |until| (from, until)));
+        let goes_back = goes_back.map(|(from, until)| sums.stretch(from, until));
+        let most = |a: &Stretch, b: &Stretch| a.gain.total_cmp(&b.gain);
+        let (Some(once), back) = (stays.max_by(most), goes_back.max_by(most)) else { break };
+        let best = back.filter(|back| back.gain > once.gain + SINGLE_STEP_NATS).unwrap_or(once);
+        if best.gain < SINGLE_STEP_NATS {
             break;
         }
-        let refined = sharpen(grid, rest, &[sectors[at].start_s], step_rad);
-        found.extend(refined.into_iter().map(|time_s| Pattern::Step { time_s }));
-        left[at..].iter_mut().for_each(|y| *y -= step_rad);
+        let sharp = |at: usize, step_rad: f64| sharpen(grid, rest, &[sectors[at].start_s], step_rad)[0];
+        let cost_nats = |at: usize| if sectors[at].run == sectors[at - 1].run { IN_RUN_NATS } else { IN_PAUSE_NATS };
+        let time_s = sharp(best.from, best.step_rad);
+        found.push(if best.until < end {
+            let until_s = sharp(best.until, -best.step_rad);
+            Pattern::Step { time_s, until_s, cost_nats: cost_nats(best.from) + cost_nats(best.until) }
+        } else {
+            Pattern::Step { time_s, until_s: f64::INFINITY, cost_nats: cost_nats(best.from) }
+        });
+        left[best.from..best.until].iter_mut().for_each(|y| *y -= best.step_rad);
     }
     found
+}
+
+/// Sectors that stand off the others.
+struct Stretch {
+    from: usize,
+    until: usize,
+    /// By how much, rad.
+    step_rad: f64,
+    /// Evidence for it, nats.
+    gain: f64,
+}
+
+/// Sums of the weights and weighted values of all sectors before each.
+struct Sums(Vec<[f64; 2]>);
+
+impl Sums {
+    fn new(sectors: &[Sector], values: &[f64]) -> Self {
+        let mut sums = vec![[0.0; 2]];
+        for (sector, value) in sectors.iter().zip(values) {
+            let [weight, sum] = sums[sums.len() - 1];
+            sums.push([weight + 1.0 / sector.variance_rad2, sum + value / sector.variance_rad2]);
+        }
+        Self(sums)
+    }
+
+    fn stretch(&self, from: usize, until: usize) -> Stretch {
+        // Neighbouring sectors of a turn share its level: as many independent values as half turns.
+        let share = 2.0 / SECTORS as f64;
+        let [total, sum] = self.0[self.0.len() - 1];
+        let [inside, inside_sum] = [0, 1].map(|n| self.0[until][n] - self.0[from][n]);
+        let outside = total - inside;
+        let step_rad = inside_sum / inside - (sum - inside_sum) / outside;
+        let gain = 0.5 * share * step_rad * step_rad * inside * outside / total;
+        Stretch { from, until, step_rad, gain }
+    }
 }
 
 /// Mean of a sector of a revolution.
@@ -205,8 +271,8 @@ fn sharpen(grid: &Grid, rest: &[f64], times_s: &[f64], size_rad: f64) -> Vec<f64
     found
 }
 
-/// Times of steps of one size and the size, where they are worth their cost.
-fn find_steps(sectors: &[Sector], tied: bool) -> Option<(Vec<f64>, f64)> {
+/// Times of steps of one size and the size, where they are worth their cost; at most two such sets.
+fn find_steps(sectors: &[Sector], tied: bool) -> Vec<(Vec<f64>, f64)> {
     let flat = level_cost(sectors, tied, &vec![0; sectors.len()], 0.0).0;
     let tried: Vec<(f64, Vec<usize>)> = (0..2 * SIZES)
         .into_par_iter()
@@ -233,26 +299,29 @@ fn find_steps(sectors: &[Sector], tied: bool) -> Option<(Vec<f64>, f64)> {
             (steps > 0).then_some((flat - cost - STEP_NATS * steps as f64, counts))
         })
         .collect();
-    let mut best: Option<(f64, Vec<usize>)> = None;
-    for (score, counts) in tried {
-        if best.as_ref().is_none_or(|(s, _)| score > *s) {
-            best = Some((score, counts));
+    // Many small steps and fewer large ones come near each other here, where all cost the same: the first by what they cost as an
+    // effect too.
+    let by_score = |a: &&(f64, Vec<usize>), b: &&(f64, Vec<usize>)| a.0.total_cmp(&b.0);
+    let as_effect = |(score, counts): &(f64, Vec<usize>)| {
+        let steps = steps_in(sectors, tied, counts);
+        score + STEP_NATS * steps as f64 - steps_cost_nats(steps)
+    };
+    let best = tried.iter().max_by(by_score).filter(|(score, _)| *score > STEPS_FOUND_NATS);
+    let other = best.and_then(|_| tried.iter().max_by(|a, b| as_effect(a).total_cmp(&as_effect(b))));
+    let mut counts: Vec<&Vec<usize>> = best.into_iter().chain(other).map(|(_, counts)| counts).collect();
+    counts.dedup();
+    let times_and_size = |counts: &Vec<usize>| {
+        let mut times_s = Vec::new();
+        for n in 1..sectors.len() {
+            let joined = tied || sectors[n].run == sectors[n - 1].run;
+            if joined && counts[n] > counts[n - 1] {
+                let time_s = sectors[n].start_s;
+                times_s.extend(std::iter::repeat_n(time_s, counts[n] - counts[n - 1]));
+            }
         }
-    }
-    let (score, counts) = best?;
-    if score < STEPS_FOUND_NATS {
-        return None;
-    }
-    let mut times_s = Vec::new();
-    for n in 1..sectors.len() {
-        let joined = tied || sectors[n].run == sectors[n - 1].run;
-        if joined && counts[n] > counts[n - 1] {
-            let time_s = sectors[n].start_s;
-            times_s.extend(std::iter::repeat_n(time_s, counts[n] - counts[n - 1]));
-        }
-    }
-    let (_, _, size_rad) = level_cost_with_size(sectors, tied, &counts);
-    Some((times_s, size_rad))
+        (times_s, level_cost_with_size(sectors, tied, counts).2)
+    };
+    counts.into_iter().map(times_and_size).collect()
 }
 
 fn steps_in(sectors: &[Sector], tied: bool, counts: &[usize]) -> usize {

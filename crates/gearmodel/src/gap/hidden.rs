@@ -58,8 +58,7 @@ impl Engine<'_> {
         let excluded = |effect: &dyn Effect| self.options.exclude.iter().any(|name| name == effect.name());
         if let Some((number, effect)) = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.steps() && !excluded(*e)) {
             let steps = |times_s: Vec<f64>| {
-                let [any, each] = events::STEPS_COST_NATS;
-                let cost_nats = any + each * times_s.len() as f64;
+                let cost_nats = events::steps_cost_nats(times_s.len());
                 Cause::Effect { effect, number, shape: times_s, cost_nats }
             };
             causes.extend(found.steps.into_iter().map(steps));
@@ -94,7 +93,8 @@ impl Engine<'_> {
             let beside = self.beside(&others, tried.collect())?;
             let (best, gain) = beside.best()?;
             let Cause::Effect { shape, .. } = &beside.pool.blocks[best].cause else { return None };
-            if gain < before + events::STEPS_COST_NATS[1] || *shape == times_s {
+            let cost_nats = events::steps_cost_nats(shape.len()) - events::steps_cost_nats(times_s.len());
+            if gain < before + cost_nats || *shape == times_s {
                 break;
             }
             (before, times_s) = (gain, shape.clone());

@@ -28,8 +28,6 @@ const MOST_TERMS: usize = 48;
 /// What a level that runs on with time costs, nats: scatter does too, a little.
 const RUNNING_ON_COST_NATS: f64 = 6.0;
 
-/// What a step costs whose time was chosen, nats.
-const STEP_COST_NATS: f64 = 6.0;
 /// What an order that was chosen from all high ones costs, nats.
 const GHOST_COST_NATS: f64 = 4.0;
 /// The same of each further one that goes with it, nats.
@@ -108,10 +106,14 @@ pub enum Pattern {
         /// Frequency, Hz.
         frequency_hz: f64,
     },
-    /// A step at a time.
+    /// A step at a time, and back at another.
     Step {
         /// Time since the campaign's start, s.
         time_s: f64,
+        /// The same of the way back, infinite where it stays.
+        until_s: f64,
+        /// What the choice of the times costs, nats.
+        cost_nats: f64,
     },
     /// Settles anew in each run: an exponential of the time since it began, of any size.
     Settling {
@@ -269,7 +271,7 @@ impl Pattern {
             Self::Order { order, .. } if order.fract() != 0.0 => WANDERING_COST_NATS,
             Self::Settling { .. } | Self::RandomWalk { .. } | Self::Tone { .. } => RUNNING_ON_COST_NATS,
             Self::Order { order, .. } if *order > HIGHEST_ORDER as f64 => GHOST_COST_NATS,
-            Self::Step { .. } => STEP_COST_NATS,
+            Self::Step { cost_nats, .. } => *cost_nats,
             Self::Comb { orders, .. } => GHOST_COST_NATS + ANOTHER_GHOST_COST_NATS * (orders.len() as f64 - 1.0),
             _ => 0.0,
         }
@@ -365,7 +367,9 @@ impl Pattern {
                 row[0] = sin;
                 row[1] = cos;
             }
-            Self::Step { time_s } => row[0] = f64::from(u8::from(at.time_s >= *time_s)),
+            Self::Step { time_s, until_s, .. } => {
+                row[0] = f64::from(u8::from((*time_s..*until_s).contains(&at.time_s)))
+            }
             Self::Settling { tau_s, starts_s } => {
                 row[at.run] = (-(at.time_s - starts_s[at.run]) / tau_s).exp();
             }
@@ -412,7 +416,10 @@ impl Pattern {
             Self::Level { odd, weight, .. } => format!("an offset, {}", scaled(*odd, *weight)),
             Self::RunLevels { .. } => "an offset that differs from run to run".to_owned(),
             Self::Tone { frequency_hz } => format!("a tone of {frequency_hz:.4} Hz in time"),
-            Self::Step { time_s } => format!("a step at {time_s:.2} s"),
+            Self::Step { time_s, until_s, .. } if until_s.is_finite() => {
+                format!("a step at {time_s:.2} s and back at {until_s:.2} s")
+            }
+            Self::Step { time_s, .. } => format!("a step at {time_s:.2} s"),
             Self::Settling { tau_s, .. } => format!("a level that settles anew in each run, within about {tau_s:.1} s"),
             Self::RandomWalk { .. } => "a level that wanders with time".to_owned(),
         }
