@@ -1,7 +1,9 @@
 //! The brake's torque ripples with order n of the driven shaft, T (1 + ρ sin(nθ2 − φ)), and winds the train up:
 //! TE = −dir·T·C(θ1)·ρ sin(nθ2 − φ), C the documented compliance of the train. The shape is [n].
 
-use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station};
+use super::{
+    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shaft, Shape, Signature, StatedError, Station,
+};
 
 /// Torque ripple of the brake.
 pub(super) struct BrakeTorqueRipple;
@@ -32,6 +34,10 @@ impl Effect for BrakeTorqueRipple {
 
     fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
         2
+    }
+
+    fn order(&self, shape: &Shape) -> Option<(Shaft, f64)> {
+        Some((Shaft::Output, *shape.first()?))
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {

@@ -177,6 +177,11 @@ pub trait Effect: Sync {
         None
     }
 
+    /// The one order of a shaft that the trace is made of, where its order is open.
+    fn order(&self, _shape: &Shape) -> Option<(Shaft, f64)> {
+        None
+    }
+
     /// True where a shape is a list of times at which the level steps.
     fn steps(&self) -> bool {
         false

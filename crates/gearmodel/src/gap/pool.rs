@@ -46,6 +46,17 @@ impl Cause {
         };
         walks(self) && steps(other) || steps(self) && walks(other)
     }
+
+    /// True of an effect at an order of its choice and a pattern at the same: one of them would have to be there by chance.
+    #[must_use]
+    pub fn coincides(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Effect { effect, shape, .. }, Self::Unknown(Pattern::Order { shaft, order, .. })) => {
+                effect.order(shape) == Some((*shaft, *order))
+            }
+            _ => false,
+        }
+    }
 }
 
 /// A block of unit-RMS columns in the pool.

@@ -12,6 +12,8 @@ use super::pool::{Cause, Pool};
 const EFFECT_ODDS: f64 = 0.04;
 /// Prior odds that any pattern outside the library is there, shared by all of them.
 const UNKNOWN_ODDS: f64 = 0.15;
+/// What it costs that an effect and a pattern share an order by chance, nats.
+const CHANCE_NATS: f64 = 8.0;
 /// Prior of an effect that is known to be there, nats.
 const KNOWN_NATS: f64 = 1e4;
 /// Most blocks of a set.
@@ -116,7 +118,9 @@ impl<'a> Search<'a> {
             .collect();
         let fit = fit(self.pool, self.whitened, set, &start)?;
         let possible = (0..set.len()).all(|n| fit.rms_rad(self.pool, n) < self.largest_rad);
-        let prior: f64 = set.iter().map(|b| self.priors[*b]).sum();
+        let causes = || set.iter().map(|b| &self.pool.blocks[*b].cause);
+        let chances = causes().flat_map(|a| causes().map(|b| a.coincides(b))).filter(|same| *same).count();
+        let prior = set.iter().map(|b| self.priors[*b]).sum::<f64>() - CHANCE_NATS * chances as f64;
         possible.then_some(Model { score: self.offset + fit.log_evidence + prior, fit })
     }
 
