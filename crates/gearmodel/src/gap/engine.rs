@@ -34,6 +34,8 @@ const SHARPER_NATS: f64 = 0.02;
 const ROUNDS: usize = 3;
 /// Log Bayes factor from which a sub-divisional error is taken off.
 const LINE_NATS: f64 = 4.0;
+/// Part of the knocks' RMS that may be left under the scatter where they ring on.
+const TAILS: f64 = 0.12;
 /// Probability from which an effect is named.
 const NAMED: f64 = 0.5;
 
@@ -277,6 +279,11 @@ impl Aside {
         self.tones_rad2() + self.knocks.map_or(0.0, |knocks| knocks.mean_square_rad2)
     }
 
+    /// RMS below which nothing is told from the tails of the knocks, rad.
+    fn least_rad(&self) -> f64 {
+        self.knocks.map_or(0.0, |knocks| TAILS * knocks.mean_square_rad2.sqrt())
+    }
+
     fn is_empty(&self) -> bool {
         self.tones.is_empty() && self.knocks.is_none()
     }
@@ -352,7 +359,7 @@ impl<'a> Engine<'a> {
         let starts: Vec<Vec<usize>> =
             self.best.as_ref().map(|m| m.fit.set.clone()).into_iter().chain(self.large.take()).collect();
         self.whitened = self.noise.whiten(&self.grid, &self.pool);
-        let mut search = Search::new(&self.pool, &self.whitened, &self.options.known);
+        let mut search = Search::new(&self.pool, &self.whitened, &self.options.known, self.aside.least_rad());
         let mut best = search.run();
         for set in starts {
             if let Some(other) = search.climb(set, Allowed::All)

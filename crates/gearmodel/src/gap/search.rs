@@ -59,6 +59,8 @@ pub struct Search<'a> {
     whitened: &'a Whitened,
     /// Constant of this noise: what the evidence of the empty set lacks.
     offset: f64,
+    /// RMS below which a part may be what something that was cut out has left, rad.
+    least_rad: f64,
     /// RMS from which two parts that cancel are no explanation, rad.
     largest_rad: f64,
     priors: Vec<f64>,
@@ -69,7 +71,7 @@ pub struct Search<'a> {
 impl<'a> Search<'a> {
     /// A search in a pool under one noise.
     #[must_use]
-    pub fn new(pool: &'a Pool, whitened: &'a Whitened, known: &[String]) -> Self {
+    pub fn new(pool: &'a Pool, whitened: &'a Whitened, known: &[String], least_rad: f64) -> Self {
         let unknowns = pool.blocks.iter().filter(|b| matches!(b.cause, Cause::Unknown(_))).count().max(1) as f64;
         let priors = pool
             .blocks
@@ -83,7 +85,7 @@ impl<'a> Search<'a> {
             .collect();
         let offset = -0.5 * whitened.log_det - 0.5 * whitened.gram[(0, 0)];
         let largest_rad = LARGEST * pool.residual_rms_rad();
-        Self { pool, whitened, offset, largest_rad, priors, seen: HashMap::new(), scanned: HashMap::new() }
+        Self { pool, whitened, offset, least_rad, largest_rad, priors, seen: HashMap::new(), scanned: HashMap::new() }
     }
 
     fn library(&self, block: usize) -> Option<usize> {
@@ -117,7 +119,7 @@ impl<'a> Search<'a> {
             })
             .collect();
         let fit = fit(self.pool, self.whitened, set, &start)?;
-        let possible = (0..set.len()).all(|n| fit.rms_rad(self.pool, n) < self.largest_rad);
+        let possible = (0..set.len()).all(|n| (self.least_rad..self.largest_rad).contains(&fit.rms_rad(self.pool, n)));
         let causes = || set.iter().map(|b| &self.pool.blocks[*b].cause);
         let chances = causes().flat_map(|a| causes().map(|b| a.coincides(b))).filter(|same| *same).count();
         let prior = set.iter().map(|b| self.priors[*b]).sum::<f64>() - CHANCE_NATS * chances as f64;
