@@ -158,7 +158,19 @@ def _ghost_order(s):
     return 20e-6 * np.sin(60 * s.theta2 + 0.4) + 8e-6 * np.sin(120 * s.theta2)
 
 
+def _jolt(s):
+    """Something gives way, and springs back later."""
+    return 60e-6 * ((s.time_s > 79.0) & (s.time_s < 158.0))
+
+
+def _between_laws(s):
+    """Order 5 by the root of the load: as a brake's ripple and a part at any load it would take two causes at one order."""
+    return 30e-6 * s.sign * np.sqrt(s.load_nm / 10) * np.sin(5 * s.theta2 + 0.3)
+
+
 OUTSIDE = [
+    (_jolt, "and back at"),
+    (_between_laws, "order 5 of the driven shaft"),
     (_settling, "settles anew"),
     (_random_walk, "wanders with time"),
     (_slow_swing, "a tone of 0.0578 Hz"),

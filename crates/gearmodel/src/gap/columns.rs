@@ -36,12 +36,11 @@ impl Columns {
         self.slots.len()
     }
 
-    /// Makes room for columns at once.
-    pub(super) fn reserve(&mut self, grid: &Grid, new: &[Values]) {
-        let places = new.iter().filter(|values| matches!(values, Values::Places(_))).count();
-        self.in_cells.reserve((new.len() - places) * grid.cells.len());
-        self.in_places.reserve(places * grid.places.len());
-        self.sums.reserve(places * grid.cells.len());
+    /// Makes room for columns, and no more than that: they are what most of the memory goes to.
+    pub(super) fn reserve(&mut self, grid: &Grid, in_cells: usize, in_places: usize) {
+        self.in_cells.reserve_exact(in_cells * grid.cells.len());
+        self.in_places.reserve_exact(in_places * grid.places.len());
+        self.sums.reserve_exact(in_places * grid.cells.len());
     }
 
     pub(super) fn push(&mut self, grid: &Grid, values: Values) {

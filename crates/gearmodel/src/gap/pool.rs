@@ -36,6 +36,22 @@ pub enum Cause {
 }
 
 impl Cause {
+    /// Its columns before those that the plan cannot see are dropped.
+    fn width(&self, rig: &Rig) -> usize {
+        match self {
+            Self::Effect { effect, shape, .. } => effect.width(rig, shape),
+            Self::Unknown(pattern) => pattern.width(),
+        }
+    }
+
+    /// True where its trace differs between the revolutions of a run.
+    fn evolves(&self) -> bool {
+        match self {
+            Self::Effect { effect, shape, .. } => effect.evolves(shape),
+            Self::Unknown(pattern) => pattern.evolves(),
+        }
+    }
+
     /// True where beside one of them the other explains nothing: steps at times of one's choice follow any random walk.
     #[must_use]
     pub fn excludes(&self, other: &Self) -> bool {
@@ -177,6 +193,8 @@ fn values(unit: &DMatrix<f64>, evolves: bool, transform: DMatrix<f64>) -> (Vec<V
     (unit.column_iter().map(|x| column(x.iter().copied().collect())).collect(), transform)
 }
 
+/// Blocks made at a time.
+const BATCH: usize = 64;
 /// Traces smaller than this part of a block's largest direction are not seen under the plan.
 const UNSEEN: f64 = 1e-5;
 
@@ -191,7 +209,9 @@ impl Pool {
             waves: vec![DMatrix::zeros(WAVES, 0); grid.revolutions.len()],
             base: Arc::new(Base::new(grid)),
         };
-        pool.append(grid, vec![Values::Places(grid.rho_rad.clone()), Values::Cells(vec![1.0; grid.cells.len()])]);
+        pool.columns.push(grid, Values::Places(grid.rho_rad.clone()));
+        pool.columns.push(grid, Values::Cells(vec![1.0; grid.cells.len()]));
+        pool.grow_sums(grid);
         pool
     }
 
@@ -247,32 +267,27 @@ impl Pool {
 
     /// Adds blocks; those that the plan cannot see are left out. Returns the numbers of those added.
     pub fn add(&mut self, grid: &Grid, rig: &Rig, causes: Vec<Cause>) -> Vec<usize> {
-        let made: Vec<(Cause, Vec<Values>, DMatrix<f64>)> = causes
-            .into_par_iter()
-            .filter_map(|cause| {
-                let (values, transform) = self.unit_columns(grid, rig, &cause)?;
-                Some((cause, values, transform))
-            })
-            .collect();
         let mut numbers = Vec::new();
-        let mut all = Vec::new();
-        let mut next = self.width();
-        for (cause, values, transform) in made {
-            let columns = next..next + values.len();
-            next = columns.end;
-            numbers.push(self.blocks.len());
-            self.blocks.push(Block { cause, columns, transform });
-            all.extend(values);
+        let (evolving, others): (Vec<_>, Vec<_>) = causes.iter().partition(|cause| cause.evolves());
+        let width = |causes: &[&Cause]| causes.iter().map(|cause| cause.width(rig)).sum();
+        self.columns.reserve(grid, width(&others), width(&evolving));
+        // Not all at once: before a column stands among the others it takes up memory twice.
+        for batch in causes.chunks(BATCH) {
+            let made: Vec<_> = batch.par_iter().map(|cause| self.unit_columns(grid, rig, cause)).collect();
+            for (cause, (values, transform)) in batch.iter().zip(made).filter_map(|(cause, made)| Some((cause, made?)))
+            {
+                let first = self.width();
+                values.into_iter().for_each(|values| self.columns.push(grid, values));
+                numbers.push(self.blocks.len());
+                self.blocks.push(Block { cause: cause.clone(), columns: first..self.width(), transform });
+            }
         }
-        self.append(grid, all);
+        self.grow_sums(grid);
         numbers
     }
 
     fn unit_columns(&self, grid: &Grid, rig: &Rig, cause: &Cause) -> Option<(Vec<Values>, DMatrix<f64>)> {
-        let (width, evolves) = match cause {
-            Cause::Effect { effect, shape, .. } => (effect.width(rig, shape), effect.evolves(shape)),
-            Cause::Unknown(pattern) => (pattern.width(), pattern.evolves()),
-        };
+        let (width, evolves) = (cause.width(rig), cause.evolves());
         let (stations, weights) =
             if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.base.cell_weight) };
         let growing = match cause {
@@ -315,14 +330,10 @@ impl Pool {
         Some(values(&gram::times(&raw, &transform), evolves, transform))
     }
 
-    /// Adds columns with their sums.
-    fn append(&mut self, grid: &Grid, new: Vec<Values>) {
-        if new.is_empty() {
+    /// The sums of columns that were added.
+    fn grow_sums(&mut self, grid: &Grid) {
+        if self.products.ncols() == self.width() {
             return;
-        }
-        self.columns.reserve(grid, &new);
-        for values in new {
-            self.columns.push(grid, values);
         }
         self.columns.grow_products(grid, &self.base.cell_weight, &mut self.products);
         let (columns, weighted) = (&self.columns, &self.base.weighted);
