@@ -25,6 +25,10 @@ deny:
 pictures:
     scripts/pictures
 
+# Time and memory of a diagnosis from arrays and from logs (after ./test, which makes .venv and the release build).
+bench-diagnose:
+    .venv/bin/python scripts/bench_diagnose.py
+
 # CPU of the daemon alone in real time, rig in a process of its own.
 bench-cpu:
     cargo build --release -p rigd
