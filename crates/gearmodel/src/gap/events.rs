@@ -14,6 +14,7 @@ use super::grid::Grid;
 use super::noise::{Noise, WAVES, waves};
 use super::pool::Pool;
 use super::reduce::{Point, ReducedRun};
+use super::sectors::{SECTORS, Sector, sectors};
 use super::unknown::Pattern;
 use crate::effect::Rig;
 use std::f64::consts::TAU;
@@ -32,8 +33,6 @@ const STEPS_FOUND_NATS: f64 = 8.0;
 /// What the time of such a step costs, nats, in a run and between two: something happens as readily in one of the few pauses.
 const IN_RUN_NATS: f64 = 6.0;
 const IN_PAUSE_NATS: f64 = 3.0;
-/// Sectors a revolution.
-const SECTORS: usize = 12;
 /// Most steps followed, and most from one sector to the next.
 const MOST_STEPS: usize = 96;
 const PAD: usize = 2;
@@ -182,44 +181,6 @@ impl Sums {
         let gain = 0.5 * share * step_rad * step_rad * inside * outside / total;
         Stretch { from, until, step_rad, gain }
     }
-}
-
-/// Mean of a sector of a revolution.
-pub(super) struct Sector {
-    run: usize,
-    start_s: f64,
-    /// Mean time of its samples, s since the campaign's start.
-    pub middle_s: f64,
-    /// Mean, rad.
-    pub mean_rad: f64,
-    /// Its variance, rad².
-    pub variance_rad2: f64,
-}
-
-/// Means of all sectors in turn.
-pub(super) fn sectors(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Sector> {
-    // Waves above the sector's own length average out; the lower ones are as good as independent from turn to turn.
-    let low: f64 = noise.order_rad2.iter().take(4).enumerate().map(|(n, v)| if n == 0 { *v } else { 2.0 * v }).sum();
-    let mut sectors = Vec::new();
-    for revolution in &grid.revolutions {
-        let places: Vec<usize> = revolution.places.clone().collect();
-        let mut ordered = places.clone();
-        ordered.sort_by(|a, b| grid.places[*a].time_s.total_cmp(&grid.places[*b].time_s));
-        let size = ordered.len().div_ceil(SECTORS).max(1);
-        for chunk in ordered.chunks(size) {
-            let weight: f64 = chunk.iter().map(|p| grid.weight[*p]).sum();
-            let mean =
-                |value: &dyn Fn(usize) -> f64| chunk.iter().map(|p| grid.weight[*p] * value(*p)).sum::<f64>() / weight;
-            sectors.push(Sector {
-                run: revolution.run,
-                start_s: grid.places[chunk[0]].time_s,
-                middle_s: mean(&|p| grid.places[p].time_s),
-                mean_rad: mean(&|p| rest[p]),
-                variance_rad2: noise.white_rad2 / weight + low,
-            });
-        }
-    }
-    sectors
 }
 
 /// Moves each step to where the places about it say: a step has a sharp edge, and one that lies off by a sector fits worse

@@ -210,7 +210,7 @@ fn gain_of_wide(schur: &DMatrix<f64>, rhs: &DVector<f64>, d: usize) -> f64 {
 }
 
 /// Log evidence gained by a block with Schur complement `schur` and right side `rhs`, mean over the scales.
-fn gain(schur: &DMatrix<f64>, rhs: &DVector<f64>, d: usize, one_sided: bool) -> f64 {
+pub(super) fn gain(schur: &DMatrix<f64>, rhs: &DVector<f64>, d: usize, one_sided: bool) -> f64 {
     if d > WIDE {
         return gain_of_wide(schur, rhs, d);
     }

@@ -16,10 +16,9 @@ const NEARER_NATS: f64 = 0.0;
 /// Most steps looked for between runs.
 const MOST_BETWEEN: usize = 4;
 
-/// Causes in a pool of their own, with what each would add to the set that is fitted there.
+/// Causes in a pool of their own, with what each would add to the set that stands there.
 struct Beside {
     pool: Pool,
-    fit: evidence::Fit,
     /// Blocks tried with their gain in log evidence.
     gains: Vec<(usize, f64)>,
 }
@@ -104,15 +103,16 @@ impl Engine<'_> {
 
     /// Looks for levels that settle in each run, swing or wander with time, and takes into the pool what is worth it.
     pub(super) fn look_for_what_runs_on(&mut self) -> bool {
+        let rest = self.pool.rest(&self.grid, &self.steady_amplitudes());
+        let sectors = sectors::sectors(&self.grid, &self.noise, &rest);
         let (settling, walk) = Pattern::running_on(&self.grid.plan);
-        let settling = settling.into_iter().map(Cause::Unknown).collect();
-        let Some(beside) = self.beside(&self.steady_set(), settling) else { return false };
-        let settles = beside.best().filter(|(_, gain)| *gain > 0.0);
-        let settles = settles.map(|(block, _)| beside.pool.blocks[block].cause.clone());
-        let rest = beside.pool.rest(&self.grid, &beside.fit.amplitudes());
-        let swings = slow_tone::strongest(&self.grid, &self.noise, &rest);
+        let worth = |pattern: Pattern| (sectors::worth(&self.grid, &sectors, &pattern), pattern);
+        let settles = settling.into_iter().map(worth).max_by(|a, b| a.0.total_cmp(&b.0));
+        let others = slow_tone::strongest(&self.grid, &sectors).into_iter().chain(walk).map(worth);
+        let worth_it: Vec<Pattern> =
+            settles.into_iter().chain(others).filter(|(nats, _)| *nats > 0.0).map(|(_, pattern)| pattern).collect();
         let mut changed = false;
-        for cause in settles.into_iter().chain(swings.into_iter().chain(walk).map(Cause::Unknown)) {
+        for cause in worth_it.into_iter().map(Cause::Unknown) {
             if let Some(noise) = self.noise_with(&cause, RUNNING_ON_ROUNDS) {
                 changed = true;
                 for block in self.pool.add(&self.grid, self.rig, vec![cause]) {
@@ -168,7 +168,7 @@ impl Engine<'_> {
         let whitened = self.noise.whiten(&self.grid, &pool);
         let fit = evidence::fit(&pool, &whitened, &set, &[])?;
         let gains = evidence::scan(&pool, &whitened, &fit, &tried);
-        Some(Beside { gains: tried.into_iter().zip(gains).collect(), pool, fit })
+        Some(Beside { gains: tried.into_iter().zip(gains).collect(), pool })
     }
 
     /// Steps and tones pass for scatter until they are taken off: the noise that one leaves beside what does not move the level,

@@ -7,7 +7,7 @@
 //! | columns of all effects and unknown patterns | `pool`, `columns`, `unknown` | sums from which every fit is made |
 //! | what does not repeat | `noise` | covariance by order, revolution and run |
 //! | how probable is a set of effects | `normal`, `evidence`, `search` | models with their posterior |
-//! | tones, steps, knocks | `events`, `knocks` | what angle does not carry |
+//! | tones, steps, knocks, what runs on with time | `events`, `knocks`, `sectors`, `slow_tone` | what angle does not carry |
 //! | probabilities, groups | `attribute` | verdict |
 //! | the gap on runs not used for the fit | `shrink` | how far it closes |
 //! | where | `locate` | tables and signature |
@@ -43,6 +43,7 @@ mod knocks;
 mod locate;
 mod next;
 mod normal;
+mod sectors;
 mod shrink;
 
 pub use diagnosis::Diagnosis;

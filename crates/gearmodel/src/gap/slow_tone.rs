@@ -3,9 +3,8 @@
 
 use std::f64::consts::TAU;
 
-use super::events::{Sector, sectors};
 use super::grid::Grid;
-use super::noise::Noise;
+use super::sectors::Sector;
 use super::unknown::Pattern;
 
 /// Steps of the search and of its refinement, in parts of what the campaign's length tells apart.
@@ -18,10 +17,9 @@ const LEAST_CYCLES: f64 = 2.0;
 /// Fewest sectors.
 const FEWEST: usize = 48;
 
-/// The slow tone that takes most off a residual, if any could be seen.
+/// The slow tone that takes most off the sectors of a residual, if any could be seen.
 #[must_use]
-pub fn strongest(grid: &Grid, noise: &Noise, rest: &[f64]) -> Option<Pattern> {
-    let sectors = sectors(grid, noise, rest);
+pub(super) fn strongest(grid: &Grid, sectors: &[Sector]) -> Option<Pattern> {
     let duration_s = grid.plan.duration_s;
     let turn_hz = grid.plan.speeds_rad_per_s.last()? / TAU;
     if sectors.len() < FEWEST || duration_s <= 0.0 {
@@ -31,7 +29,7 @@ pub fn strongest(grid: &Grid, noise: &Noise, rest: &[f64]) -> Option<Pattern> {
         let steps = ((high_hz - low_hz) / step_hz).ceil().max(0.0) as usize;
         (0..=steps)
             .map(|n| low_hz + n as f64 * step_hz)
-            .map(|frequency_hz| (frequency_hz, explained(&sectors, frequency_hz)))
+            .map(|frequency_hz| (frequency_hz, explained(sectors, frequency_hz)))
             .max_by(|a, b| a.1.total_cmp(&b.1))
     };
     let unit_hz = 1.0 / duration_s;
