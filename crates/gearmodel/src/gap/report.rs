@@ -28,17 +28,24 @@ const LINE_ODDS: f64 = 0.04;
 /// floor, the nominal and the noise model's.
 const INEXACT: f64 = 0.05;
 const INEXACT_OF_FLOOR: f64 = 0.08;
+/// The same of a resonance: how it is excited is known less well than geometry is.
+const INEXACT_RINGING: f64 = 0.08;
 /// Knocks ring at a resonance's own frequency where both are no further apart than a factor of e to this.
 const SAME_RING: f64 = 0.3;
-/// A wandering level under this part of the floor may be scatter.
+/// A wandering level under this part of the floor may be scatter; so may one that steps between runs.
 const WANDERS_OF_FLOOR: f64 = 0.8;
+const STEPS_OF_FLOOR: f64 = 0.4;
 
 /// Largest probability of what may be no more than that.
 const INEXACT_PROBABILITY: f64 = 0.02;
 
+/// Largest probability of steps that make the prediction of held-out runs worse.
+const UNPREDICTIVE_PROBABILITY: f64 = 0.3;
+
 /// Smallest RMS worth naming beside what was found and what does not repeat.
-fn least_rad(found_rad2: f64, floor_rad: f64) -> f64 {
-    (INEXACT * found_rad2.sqrt()).max(INEXACT_OF_FLOOR * floor_rad)
+fn least_rad(found_rad2: f64, rings_rad2: f64, floor_rad: f64) -> f64 {
+    let part = (INEXACT * found_rad2.sqrt()).max(INEXACT_RINGING * rings_rad2.sqrt());
+    part.max(INEXACT_OF_FLOOR * floor_rad)
 }
 
 /// What is named, and groups whose members have one and the same trace with the probability that one of them is there.
@@ -58,6 +65,8 @@ struct Finding {
     rms_rad: f64,
     shrink: Option<f64>,
     twins: Vec<(usize, f64)>,
+    /// Most that its probability may be, whatever the evidence.
+    most: f64,
 }
 
 impl Engine<'_> {
@@ -75,7 +84,7 @@ impl Engine<'_> {
         let held_out = HeldOut::new(&self.grid, &self.pool, &self.noise, &columns);
         let floor_rad2 = held_out.floor_rad2(&self.grid, &self.noise);
         let before = held_out.errors(&Selection::default());
-        let after = held_out.errors(&self.selection(best));
+        let after = held_out.errors(&self.selection(best, None));
         let found = !best.fit.set.is_empty() || !lines.is_empty() || !self.aside.is_empty();
         let lines_rad2 = lines.iter().map(|l| l.explained_rad2).sum::<f64>() / self.grid.samples;
         let explained_rad2 = lines_rad2 + self.aside.mean_square_rad2();
@@ -108,15 +117,24 @@ impl Engine<'_> {
             .filter(|n| matches!(self.pool.blocks[best.fit.set[*n]].cause, Cause::Unknown(_)))
             .map(|n| best.fit.rms_rad(&self.pool, n).powi(2))
             .sum();
-        let least_rad = least_rad(total_rad2 + unknown_rad2 + explained_rad2, gap.floor_rad);
+        let least_rad = least_rad(total_rad2 + unknown_rad2 + explained_rad2, self.rings_rad2(best), gap.floor_rad);
         for finding in &mut findings {
             if finding.rms_rad < least_rad {
-                finding.probability = finding.probability.min(INEXACT_PROBABILITY);
+                finding.most = INEXACT_PROBABILITY;
+            } else if LIBRARY[finding.number].steps() {
+                // Steps stand where this data wants them: that says little unless they hold for the runs that are left out.
+                let own = |b: &usize| finding.block == Some(*b);
+                let left_out = best.fit.set.iter().position(own);
+                let without = left_out.map(|n| held_out.errors(&self.selection(best, Some(n))).mean());
+                if without.is_some_and(|without| without <= after.mean()) {
+                    finding.most = UNPREDICTIVE_PROBABILITY;
+                }
             }
+            finding.probability = finding.probability.min(finding.most);
         }
         findings.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.number.cmp(&b.number)));
 
-        let Named { groups, verdict, identical } = self.verdict(&findings, &attribution, best, least_rad);
+        let Named { groups, verdict, identical } = self.verdict(&findings, &attribution, best);
         // Which of the same traces the search met first says nothing: they are equally probable.
         for (members, probability) in identical {
             for finding in findings.iter_mut().filter(|f| members.contains(&f.number)) {
@@ -159,13 +177,17 @@ impl Engine<'_> {
         })
     }
 
-    fn selection(&self, model: &Model) -> Selection {
-        let mut prior_rad2 = Vec::new();
-        for (block, scale) in model.fit.set.iter().zip(&model.fit.scales_rad) {
-            let d = self.pool.blocks[*block].width();
-            prior_rad2.extend(std::iter::repeat_n(scale * scale / d as f64, d));
+    /// A model's columns, without one of its blocks.
+    fn selection(&self, model: &Model, left_out: Option<usize>) -> Selection {
+        let mut selection = Selection::default();
+        for (n, (block, scale)) in model.fit.set.iter().zip(&model.fit.scales_rad).enumerate() {
+            if Some(n) != left_out {
+                let columns = self.pool.blocks[*block].columns.clone();
+                selection.prior_rad2.extend(columns.clone().map(|_| scale * scale / columns.len() as f64));
+                selection.columns.extend(columns);
+            }
         }
-        Selection { columns: model.fit.columns[1..].to_vec(), prior_rad2 }
+        selection
     }
 
     /// Every effect with its best block, its amplitudes as if it were the one, and who cannot be told from it.
@@ -244,6 +266,7 @@ impl Engine<'_> {
                 rms_rad,
                 shrink: None,
                 twins,
+                most: 1.0,
             });
         }
         findings
@@ -274,6 +297,7 @@ impl Engine<'_> {
             rms_rad,
             shrink: None,
             twins: Vec::new(),
+            most: 1.0,
         }
     }
 
@@ -312,7 +336,7 @@ impl Engine<'_> {
     }
 
     /// Groups and what is named.
-    fn verdict(&self, findings: &[Finding], attribution: &Attribution, best: &Model, least_rad: f64) -> Named {
+    fn verdict(&self, findings: &[Finding], attribution: &Attribution, best: &Model) -> Named {
         let mut identical = Vec::new();
         let mut groups = Vec::new();
         let mut verdict = Vec::new();
@@ -339,8 +363,7 @@ impl Engine<'_> {
                     .sum::<f64>()
                     .min(1.0)
             };
-            let probability =
-                if finding.rms_rad < least_rad { probability.min(INEXACT_PROBABILITY) } else { probability };
+            let probability = probability.min(finding.most);
             let in_best = finding.block.is_none()
                 || best.fit.set.iter().any(
                     |b| matches!(&self.pool.blocks[*b].cause, Cause::Effect { number, .. } if members.contains(number)),
@@ -387,12 +410,12 @@ impl Engine<'_> {
         let slowest_hz = self.grid.plan.speeds_rad_per_s.first().map_or(0.0, |speed| speed / std::f64::consts::TAU);
         let shown_hz = 0.5 * self.grid.bins as f64 * slowest_hz;
         let own = |knocks: &&Knocks| {
-            self.rings_hz(best).any(|hz| hz > shown_hz || (knocks.ring_hz / hz).ln().abs() < SAME_RING)
+            self.rings_hz(best).any(|(_, hz)| hz > shown_hz || (knocks.ring_hz / hz).ln().abs() < SAME_RING)
         };
         let knocks = self.aside.knocks.as_ref().filter(|knocks| !own(knocks));
         square += self.aside.tones_rad2() + knocks.map_or(0.0, |knocks| knocks.mean_square_rad2);
         let rms_rad = square.sqrt();
-        let least_rad = least_rad(known.max(lines_rad2), floor_rad);
+        let least_rad = least_rad(known.max(lines_rad2), self.rings_rad2(best), floor_rad);
         if let Some(knocks) = knocks.filter(|knocks| knocks.mean_square_rad2.sqrt() > least_rad) {
             let description = format!(
                 "{} knocks or lost readings of up to {:.0} urad, the first at {:.2} s",
@@ -410,8 +433,12 @@ impl Engine<'_> {
             return Unknown { probability: EVENT_PROBABILITY, rms_rad, location };
         }
         // Effects are linearised and their shapes lie on grids: a small part of them may stay behind. Scatter wanders too.
-        let wanders = strongest.is_some_and(|(_, pattern)| matches!(pattern, Pattern::RandomWalk { .. }));
-        let least_rad = if wanders { least_rad.max(WANDERS_OF_FLOOR * floor_rad) } else { least_rad };
+        let of_floor = match strongest {
+            Some((_, Pattern::RandomWalk { .. })) => WANDERS_OF_FLOOR,
+            Some((_, Pattern::Step { .. })) => STEPS_OF_FLOOR,
+            _ => 0.0,
+        };
+        let least_rad = least_rad.max(of_floor * floor_rad);
         let inexact = square > 0.0 && rms_rad < least_rad;
         let probability = if inexact { attribution.unknown.min(INEXACT_PROBABILITY) } else { attribution.unknown };
         let location = strongest
@@ -420,12 +447,17 @@ impl Engine<'_> {
         Unknown { probability: probability.min(1.0), rms_rad, location }
     }
 
-    /// Frequencies of the resonances in a model, Hz.
-    fn rings_hz(&self, model: &Model) -> impl Iterator<Item = f64> {
+    /// Where in a model's set resonances stand, and their frequencies, Hz.
+    fn rings_hz(&self, model: &Model) -> impl Iterator<Item = (usize, f64)> {
         (0..model.fit.set.len()).filter_map(|n| match &self.pool.blocks[model.fit.set[n]].cause {
-            Cause::Effect { effect, shape, .. } => effect.rings_hz(shape, &self.raw(model, n)),
+            Cause::Effect { effect, shape, .. } => Some((n, effect.rings_hz(shape, &self.raw(model, n))?)),
             Cause::Unknown(_) => None,
         })
+    }
+
+    /// Mean square of the resonances in a model, rad².
+    fn rings_rad2(&self, model: &Model) -> f64 {
+        self.rings_hz(model).map(|(n, _)| model.fit.rms_rad(&self.pool, n).powi(2)).sum()
     }
 
     /// Shares of the reducible gap: each effect's part of the whole fitted trace.
