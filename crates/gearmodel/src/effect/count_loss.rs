@@ -81,7 +81,8 @@ impl Effect for CountLoss {
             parameters.push(Parameter::number("counts", whole, std, "counts"));
         }
         parameters.push(Parameter::number("step_rad", step_rad, found.std(0), "rad"));
-        parameters.push(Parameter::number("steps", steps, 0.0, ""));
+        // What lies between the places found may be one step or two.
+        parameters.push(Parameter::grid("steps", steps, ""));
         parameters
     }
 
