@@ -16,7 +16,7 @@ use super::reduce::{ReducedRun, Reducer, Sample};
 use super::search::{Allowed, Model, Search};
 use super::unknown::Pattern;
 use super::{events, evidence, ghosts, interpolation, knocks, locate, next, sectors, shrink, slow_tone};
-use crate::effect::{Accumulates, Effect, Estimate, INTERPOLATION, LIBRARY, Rig, by_name};
+use crate::effect::{Accumulates, Carrier, Effect, Estimate, INTERPOLATION, LIBRARY, Rig, by_name};
 use crate::recording::Recording;
 use crate::{Direction, NominalModel};
 

@@ -69,18 +69,19 @@ impl Engine<'_> {
         changed
     }
 
-    /// The steps of the best model and those between runs that take the place of levels of their own, if it has both.
+    /// The steps of the best model and those between runs that were taken for levels of theirs.
     fn steps_between_runs(&self, steps: &dyn Fn(Vec<f64>) -> Cause) -> Option<Vec<f64>> {
         let set = &self.best.as_ref()?.fit.set;
         let mut times_s = set.iter().find_map(|b| match &self.pool.blocks[*b].cause {
             Cause::Effect { effect, shape, .. } if effect.steps() && shape.len() > 1 => Some(shape.clone()),
             _ => None,
         })?;
-        let levels = |b: &usize| matches!(&self.pool.blocks[*b].cause, Cause::Unknown(Pattern::RunLevels { .. }));
-        if !set.iter().any(levels) {
-            return None;
-        }
-        let others = self.steady_set();
+        // Without effects that show as levels only: they have taken the steps up.
+        let mut others = self.steady_set();
+        others.retain(|b| match &self.pool.blocks[*b].cause {
+            Cause::Effect { effect, shape, .. } => effect.signature_of(self.rig, shape).carrier != Carrier::None,
+            Cause::Unknown(_) => true,
+        });
         let mut before = f64::NEG_INFINITY;
         for _ in 0..MOST_BETWEEN {
             let with = |more: Option<&f64>| {
