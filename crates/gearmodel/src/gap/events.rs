@@ -25,6 +25,8 @@ const STEP_NATS: f64 = 4.0;
 const STEPS_COST_NATS: [f64; 2] = [8.0, 6.5];
 /// Steps up to which those at the edges of runs are moved off them: more speak for one another.
 const FEW_STEPS: usize = 3;
+/// Times that steps are moved.
+const SETTLING_PASSES: usize = 3;
 /// Most single steps of any size looked for, and the evidence from which one is taken into the pool, nats.
 const SINGLE_STEPS: usize = 3;
 const SINGLE_STEP_NATS: f64 = 14.0;
@@ -230,6 +232,48 @@ fn sharpen(grid: &Grid, rest: &[f64], times_s: &[f64], size_rad: f64) -> Vec<f64
         .collect();
     found.sort_by(f64::total_cmp);
     found
+}
+
+/// Moves steps of one size, one after the other, to where the sectors of a residual want them while the others stay. Without a size it is
+/// that which they have where they stand.
+pub(super) fn settle(grid: &Grid, noise: &Noise, rest: &[f64], times_s: &[f64], size_rad: Option<f64>) -> Vec<f64> {
+    let sectors = sectors(grid, noise, rest);
+    let size_of = |times_s: &[f64]| {
+        let so_far = |s: &Sector| times_s.iter().filter(|t| **t <= s.middle_s).count();
+        size_rad
+            .unwrap_or_else(|| level_cost_with_size(&sectors, true, &sectors.iter().map(so_far).collect::<Vec<_>>()).2)
+    };
+    let total: f64 = sectors.iter().map(|s| 1.0 / s.variance_rad2).sum();
+    let mut times_s = times_s.to_vec();
+    for _ in 0..SETTLING_PASSES {
+        let (before, size_rad) = (times_s.clone(), size_of(&times_s));
+        for n in 0..times_s.len() {
+            let so_far = |at_s: f64, times_s: &[f64]| times_s.iter().filter(|t| **t <= at_s).count() as f64;
+            let without = |s: &Sector| {
+                let own = f64::from(u8::from(times_s[n] <= s.middle_s));
+                s.mean_rad - size_rad * (so_far(s.middle_s, &times_s) - own)
+            };
+            let left: Vec<f64> = sectors.iter().map(without).collect();
+            let mean = left.iter().zip(&sectors).map(|(y, s)| y / s.variance_rad2).sum::<f64>() / total;
+            // Least squares with a free level, as where single steps are looked for.
+            let (mut after, mut after_sum) = (total, 0.0);
+            let mut best = (f64::NEG_INFINITY, 0);
+            for (m, (sector, y)) in sectors.iter().zip(&left).enumerate() {
+                let gain = 2.0 * size_rad * -after_sum - size_rad * size_rad * after * (total - after) / total;
+                if gain > best.0 {
+                    best = (gain, m);
+                }
+                after -= 1.0 / sector.variance_rad2;
+                after_sum += (y - mean) / sector.variance_rad2;
+            }
+            times_s[n] = sectors[best.1].start_s;
+        }
+        times_s.sort_by(f64::total_cmp);
+        if times_s == before {
+            break;
+        }
+    }
+    sharpen(grid, rest, &times_s, size_of(&times_s))
 }
 
 /// Times of steps of one size and the size, where they are worth their cost; at most two such sets.

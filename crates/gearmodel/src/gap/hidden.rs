@@ -61,7 +61,7 @@ impl Engine<'_> {
                 Cause::Effect { effect, number, shape: times_s, cost_nats }
             };
             causes.extend(found.steps.into_iter().map(steps));
-            causes.extend(self.steps_between_runs(&steps).map(steps));
+            causes.extend(self.steps_between_runs(&steps).into_iter().flatten().map(steps));
         }
         causes.retain(|cause| self.block_of(cause).is_none());
         let changed = !causes.is_empty();
@@ -69,11 +69,15 @@ impl Engine<'_> {
         changed
     }
 
-    /// The steps of the best model and those between runs that were taken for levels of theirs.
-    fn steps_between_runs(&self, steps: &dyn Fn(Vec<f64>) -> Cause) -> Option<Vec<f64>> {
-        let set = &self.best.as_ref()?.fit.set;
-        let mut times_s = set.iter().find_map(|b| match &self.pool.blocks[*b].cause {
-            Cause::Effect { effect, shape, .. } if effect.steps() && shape.len() > 1 => Some(shape.clone()),
+    /// The steps of the best model and those between runs that were taken for levels of theirs: as they are, and each moved to where
+    /// it fits best.
+    fn steps_between_runs(&self, steps: &dyn Fn(Vec<f64>) -> Cause) -> Option<[Vec<f64>; 3]> {
+        let best = self.best.as_ref()?;
+        let fit = &best.fit;
+        let (mut times_s, size_rad) = (0..fit.set.len()).find_map(|n| match &self.pool.blocks[fit.set[n]].cause {
+            Cause::Effect { effect, shape, .. } if effect.steps() && shape.len() > 1 => {
+                Some((shape.clone(), self.raw(best, n).beta[0]))
+            }
             _ => None,
         })?;
         // Without effects that show as levels only: they have taken the steps up.
@@ -99,7 +103,15 @@ impl Engine<'_> {
             }
             (before, times_s) = (gain, shape.clone());
         }
-        before.is_finite().then_some(times_s)
+        let place = |b: &usize| fit.set.iter().position(|own| own == b);
+        let stays = |b: &usize| place(b).map(|n| fit.place(&self.pool, n)).into_iter().flatten();
+        let amplitudes: Vec<(usize, f64)> =
+            others.iter().flat_map(stays).map(|n| (fit.columns[n], fit.mean[n])).collect();
+        let rest = self.pool.rest(&self.grid, &amplitudes);
+        // Of the size in the model, and of their own: what else is in the model may have taken a part of it.
+        let settled = |size_rad| events::settle(&self.grid, &self.noise, &rest, &times_s, size_rad);
+        let (as_found, of_their_own) = (settled(Some(size_rad)), settled(None));
+        before.is_finite().then(|| [times_s, as_found, of_their_own])
     }
 
     /// Looks for levels that settle in each run, swing or wander with time, and takes into the pool what is worth it.
