@@ -182,6 +182,11 @@ pub trait Effect: Sync {
         None
     }
 
+    /// Effects whose trace it may leave a part of, because it is known to no better than that, and that part of its RMS.
+    fn leaves(&self) -> (&'static [&'static str], f64) {
+        (&[], 0.0)
+    }
+
     /// True where a shape is a list of times at which the level steps.
     fn steps(&self) -> bool {
         false

@@ -93,6 +93,11 @@ impl Effect for PitchErrors {
         Grain::Sharp
     }
 
+    /// A mean over the flanks is a backlash, and which teeth carry how long, hence the mean of those that do, is known roughly.
+    fn leaves(&self) -> (&'static [&'static str], f64) {
+        (&["backlash_error", "bearing_clearance", "centre_distance_error"], 0.4)
+    }
+
     fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
         let teeth = teeth(rig);
         let side = usize::from(at.sense < 0.0);

@@ -118,7 +118,16 @@ impl Engine<'_> {
             .map(|n| best.fit.rms_rad(&self.pool, n).powi(2))
             .sum();
         let least_rad = least_rad(total_rad2 + unknown_rad2 + explained_rad2, self.rings_rad2(best), gap.floor_rad);
+        let left: Vec<(&[&str], f64)> = findings
+            .iter()
+            .filter(|f| f.probability > NAMED)
+            .map(|f| (LIBRARY[f.number].leaves(), f.rms_rad))
+            .map(|((names, part), rms_rad)| (names, part * rms_rad))
+            .collect();
         for finding in &mut findings {
+            let name = LIBRARY[finding.number].name();
+            let left_rad = left.iter().filter(|(names, _)| names.contains(&name)).map(|(_, rad)| *rad);
+            let least_rad = left_rad.fold(least_rad, f64::max);
             if finding.rms_rad < least_rad {
                 finding.most = INEXACT_PROBABILITY;
             } else if LIBRARY[finding.number].steps() {
