@@ -192,6 +192,17 @@ def test_what_no_effect_makes_is_called_unknown_and_described(outside, said):
     assert any("encoder2_eccentricity" in v for v in named), str(d)
 
 
+def test_lost_counts_are_counted_where_runs_end_too():
+    """Seven steps of one size, some of them in the last degrees of a run: the levels of the runs must not take them up."""
+    lost_at_rev = np.array([1.3, 3.97, 8.02, 11.6, 15.98, 20.4, 22.1])
+    recordings = c.made(c.recordings([lambda s: -35e-6 * np.searchsorted(lost_at_rev, s.revolutions)]))
+    d = gm.diagnose(recordings, c.pair())
+    assert d.verdict == ["count_loss"], str(d)
+    lost = next(e for e in d.effects if e.name == "count_loss")
+    assert lost.parameters["steps"].value == 7, str(d)
+    assert lost.parameters["step_rad"].value == pytest.approx(-35e-6, abs=2e-6), str(d)
+
+
 def test_the_order_of_recordings_does_not_matter(found):
     again = gm.diagnose(c.made(c.recordings(EFFECTS)[::-1]), c.pair())
     assert c.names(again.verdict) == c.names(found.verdict)

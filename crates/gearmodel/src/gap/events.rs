@@ -43,6 +43,8 @@ const SIZES: usize = 30;
 const SMALLEST_RAD: f64 = 1.5e-6;
 /// Ratio of neighbouring sizes.
 const SIZE_RATIO: f64 = 1.26;
+/// Most steps that a rise is shared out to.
+const MOST_SHARED: u32 = 32;
 /// Frequencies of the search for tones.
 const TONE_STEPS: usize = 1 << 17;
 /// Log odds from which a tone is taken into the pool.
@@ -279,31 +281,36 @@ pub(super) fn settle(grid: &Grid, noise: &Noise, rest: &[f64], times_s: &[f64], 
 /// Times of steps of one size and the size, where they are worth their cost; at most two such sets.
 fn find_steps(sectors: &[Sector], tied: bool) -> Vec<(Vec<f64>, f64)> {
     let flat = level_cost(sectors, tied, &vec![0; sectors.len()], 0.0).0;
-    let tried: Vec<(f64, Vec<usize>)> = (0..2 * SIZES)
-        .into_par_iter()
-        .filter_map(|n| {
-            let sign = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
-            let mut size_rad = sign * SMALLEST_RAD * SIZE_RATIO.powi((n / 2) as i32);
-            let mut levels = initial_levels(sectors, tied);
-            let mut counts = Vec::new();
-            let mut cost = f64::INFINITY;
-            for _ in 0..3 {
-                let next = follow(sectors, tied, &levels, size_rad);
-                // The same steps have the same levels and size: nothing would move any more.
-                if next == counts {
-                    break;
-                }
-                counts = next;
-                let slope;
-                (cost, levels, slope) = level_cost_with_size(sectors, tied, &counts);
-                if slope * size_rad > 0.0 && (slope / size_rad).abs() < 2.0 && (slope / size_rad).abs() > 0.5 {
-                    size_rad = slope;
-                }
+    let followed = |size_rad: f64| {
+        let mut size_rad = size_rad;
+        let mut levels = initial_levels(sectors, tied);
+        let mut counts = Vec::new();
+        let mut cost = f64::INFINITY;
+        for _ in 0..3 {
+            let next = follow(sectors, tied, &levels, size_rad);
+            // The same steps have the same levels and size: nothing would move any more.
+            if next == counts {
+                break;
             }
-            let steps = steps_in(sectors, tied, &counts);
-            (steps > 0).then_some((flat - cost - STEP_NATS * steps as f64, counts))
-        })
-        .collect();
+            counts = next;
+            let slope;
+            (cost, levels, slope) = level_cost_with_size(sectors, tied, &counts);
+            if slope * size_rad > 0.0 && (slope / size_rad).abs() < 2.0 && (slope / size_rad).abs() > 0.5 {
+                size_rad = slope;
+            }
+        }
+        let steps = steps_in(sectors, tied, &counts);
+        (steps > 0).then_some((flat - cost - STEP_NATS * steps as f64, counts))
+    };
+    let sizes = (0..SIZES as i32).map(|n| SMALLEST_RAD * SIZE_RATIO.powi(n));
+    let sizes: Vec<f64> = sizes.flat_map(|size_rad| [size_rad, -size_rad]).collect();
+    let mut tried: Vec<(f64, Vec<usize>)> = sizes.into_par_iter().filter_map(followed).collect();
+    // How far they rise together is known well then; by a step of the grid too large the same way takes one step fewer.
+    if let Some((_, counts)) = tried.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+        let rise_rad = level_cost_with_size(sectors, tied, counts).2 * steps_in(sectors, tied, counts) as f64;
+        let shared: Vec<f64> = (1..=MOST_SHARED).map(|steps| rise_rad / f64::from(steps)).collect();
+        tried.extend(shared.into_par_iter().filter_map(followed).collect::<Vec<_>>());
+    }
     // Many small steps and fewer large ones come near each other here, where all cost the same: the first by what they cost as an
     // effect too.
     let by_score = |a: &&(f64, Vec<usize>), b: &&(f64, Vec<usize>)| a.0.total_cmp(&b.0);
