@@ -318,10 +318,10 @@ impl<'a> Engine<'a> {
             causes.extend(shapes.into_iter().map(|shape| Cause::Effect { effect, number, shape, cost_nats }));
         }
         causes.extend(Pattern::all(&grid.plan).into_iter().map(Cause::Unknown));
-        pool.add(&grid, rig, causes);
+        pool.add(&grid, rig, &causes);
         let noise = Noise::estimate(&grid, &pool, &[]);
         let ghosts = ghosts::find(&grid, &noise, &grid.rho_rad);
-        pool.add(&grid, rig, ghosts.into_iter().map(Cause::Unknown).collect());
+        pool.add(&grid, rig, &ghosts.into_iter().map(Cause::Unknown).collect::<Vec<_>>());
         let whitened = Whitened::empty();
         Self { rig, aside, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None }
     }
@@ -430,8 +430,9 @@ impl<'a> Engine<'a> {
         if changed {
             let shaped: Vec<Cause> = few.blocks.into_iter().map(|block| block.cause).collect();
             let known: Vec<Option<usize>> = shaped.iter().map(|cause| self.block_of(cause)).collect();
-            let fresh = shaped.into_iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(cause, _)| cause).collect();
-            let mut added = self.pool.add(&self.grid, self.rig, fresh).into_iter();
+            let fresh: Vec<Cause> =
+                shaped.into_iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(cause, _)| cause).collect();
+            let mut added = self.pool.add(&self.grid, self.rig, &fresh).into_iter();
             self.large = Some(known.into_iter().filter_map(|k| k.or_else(|| added.next())).collect());
         }
         changed
@@ -468,7 +469,7 @@ impl<'a> Engine<'a> {
             .into_par_iter()
             .filter_map(|cause| {
                 let mut tried = others.clone();
-                tried.add(&self.grid, self.rig, vec![cause]).first()?;
+                tried.add(&self.grid, self.rig, &[cause]).first()?;
                 let fit = evidence::fit(&tried, &self.noise.whiten(&self.grid, &tried), &all, &start_rad)?;
                 Some((fit.log_evidence, tried))
             })

@@ -65,7 +65,7 @@ impl Engine<'_> {
         }
         causes.retain(|cause| self.block_of(cause).is_none());
         let changed = !causes.is_empty();
-        self.add_and_weigh(causes);
+        self.add_and_weigh(&causes);
         changed
     }
 
@@ -94,7 +94,7 @@ impl Engine<'_> {
                 steps(shape)
             };
             let tried = std::iter::once(with(None)).chain(self.grid.plan.starts_s.iter().map(|t| with(Some(t))));
-            let beside = self.beside(&others, tried.collect())?;
+            let beside = self.beside(&others, &tried.collect::<Vec<_>>())?;
             let (best, gain) = beside.best()?;
             let Cause::Effect { shape, .. } = &beside.pool.blocks[best].cause else { return None };
             let cost_nats = events::steps_cost_nats(shape.len()) - events::steps_cost_nats(times_s.len());
@@ -111,7 +111,7 @@ impl Engine<'_> {
         // Of the size in the model, and of their own: what else is in the model may have taken a part of it.
         let settled = |size_rad| events::settle(&self.grid, &self.noise, &rest, &times_s, size_rad);
         let (as_found, of_their_own) = (settled(Some(size_rad)), settled(None));
-        before.is_finite().then(|| [times_s, as_found, of_their_own])
+        before.is_finite().then_some([times_s, as_found, of_their_own])
     }
 
     /// Looks for levels that settle in each run, swing or wander with time, and takes into the pool what is worth it.
@@ -128,7 +128,7 @@ impl Engine<'_> {
         for cause in worth_it.into_iter().map(Cause::Unknown) {
             if let Some(noise) = self.noise_with(&cause, RUNNING_ON_ROUNDS) {
                 changed = true;
-                for block in self.pool.add(&self.grid, self.rig, vec![cause]) {
+                for block in self.pool.add(&self.grid, self.rig, &[cause]) {
                     self.weigh_event(block, noise.clone());
                 }
             }
@@ -145,8 +145,8 @@ impl Engine<'_> {
         let found = self.best.as_ref().map(|m| m.fit.set.clone()).unwrap_or_default();
         let mut best: Option<(Pattern, f64)> = None;
         for _ in 0..3 {
-            let tried = patterns.iter().cloned().map(Cause::Unknown).collect();
-            let Some(beside) = self.beside(&found, tried) else { return false };
+            let tried: Vec<Cause> = patterns.iter().cloned().map(Cause::Unknown).collect();
+            let Some(beside) = self.beside(&found, &tried) else { return false };
             for (block, gain) in &beside.gains {
                 if let Cause::Unknown(pattern) = &beside.pool.blocks[*block].cause
                     && best.as_ref().is_none_or(|(_, g)| gain > g)
@@ -159,11 +159,11 @@ impl Engine<'_> {
             step *= 0.5;
         }
         let Some((pattern, _)) = best else { return false };
-        self.add_and_weigh(vec![Cause::Unknown(pattern)])
+        self.add_and_weigh(&[Cause::Unknown(pattern)])
     }
 
     /// Adds events to the pool and weighs each; true where any could be added.
-    fn add_and_weigh(&mut self, events: Vec<Cause>) -> bool {
+    fn add_and_weigh(&mut self, events: &[Cause]) -> bool {
         let added = self.pool.add(&self.grid, self.rig, events);
         for block in &added {
             if let Some(noise) = self.noise_with(&self.pool.blocks[*block].cause, 1) {
@@ -174,7 +174,7 @@ impl Engine<'_> {
     }
 
     /// What each of several causes would add to a set of blocks, in a pool of their own.
-    fn beside(&self, others: &[usize], tried: Vec<Cause>) -> Option<Beside> {
+    fn beside(&self, others: &[usize], tried: &[Cause]) -> Option<Beside> {
         let mut pool = self.pool.only(&self.grid, others);
         let set: Vec<usize> = (0..others.len()).collect();
         let tried = pool.add(&self.grid, self.rig, tried);
@@ -191,7 +191,7 @@ impl Engine<'_> {
         let best = self.best.as_ref()?;
         // In a pool of its own: most events that are none fail here.
         let mut few = self.pool.only(&self.grid, &steady);
-        few.add(&self.grid, self.rig, vec![event.clone()]);
+        few.add(&self.grid, self.rig, std::slice::from_ref(event));
         let own: Vec<usize> = (0..few.blocks.len()).collect();
         let mut noise = self.noise.clone();
         // What passes for scatter holds its own amplitudes down until the scatter is less.

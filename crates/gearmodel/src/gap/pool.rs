@@ -266,7 +266,7 @@ impl Pool {
     }
 
     /// Adds blocks; those that the plan cannot see are left out. Returns the numbers of those added.
-    pub fn add(&mut self, grid: &Grid, rig: &Rig, causes: Vec<Cause>) -> Vec<usize> {
+    pub fn add(&mut self, grid: &Grid, rig: &Rig, causes: &[Cause]) -> Vec<usize> {
         let mut numbers = Vec::new();
         let (evolving, others): (Vec<_>, Vec<_>) = causes.iter().partition(|cause| cause.evolves());
         let width = |causes: &[&Cause]| causes.iter().map(|cause| cause.width(rig)).sum();

@@ -368,7 +368,7 @@ impl Pattern {
                 row[1] = cos;
             }
             Self::Step { time_s, until_s, .. } => {
-                row[0] = f64::from(u8::from((*time_s..*until_s).contains(&at.time_s)))
+                row[0] = f64::from(u8::from((*time_s..*until_s).contains(&at.time_s)));
             }
             Self::Settling { tau_s, starts_s } => {
                 row[at.run] = (-(at.time_s - starts_s[at.run]) / tau_s).exp();
