@@ -548,7 +548,7 @@ def readings(world: World, effects: dict, scatter: bool = False):
         phase = pitches(g) - (0.0 if sign > 0 else 0.5)
         if p := get("profile_error"):
             for n in (1, 2, 3):
-                lead += p[f"a{n}_mm"] * np.cos(TAU * n * phase - p[f"ph{n}_rad"])
+                lead += p[f"a{n}_mm"] * np.sin(TAU * n * phase - p[f"ph{n}_rad"])
         if p := get("pitch_errors"):
             table = p["ccw_mm"] if sign > 0 else p["cw_mm"]
             near = np.floor(phase).astype(np.int64)
