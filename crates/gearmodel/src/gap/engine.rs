@@ -359,7 +359,7 @@ impl<'a> Engine<'a> {
         let starts: Vec<Vec<usize>> =
             self.best.as_ref().map(|m| m.fit.set.clone()).into_iter().chain(self.large.take()).collect();
         self.whitened = self.noise.whiten(&self.grid, &self.pool);
-        let mut search = Search::new(&self.pool, &self.whitened, &self.options.known, self.aside.least_rad());
+        let mut search = self.search_in(&self.pool, &self.whitened);
         let mut best = search.run();
         for set in starts {
             if let Some(other) = search.climb(set, Allowed::All)
@@ -376,6 +376,11 @@ impl<'a> Engine<'a> {
             best = self.models.first().cloned();
         }
         self.best = best;
+    }
+
+    /// A search in a pool under one noise, with what is known and what was cut out.
+    fn search_in<'b>(&self, pool: &'b Pool, whitened: &'b Whitened) -> Search<'b> {
+        Search::new(pool, whitened, &self.options.known, self.aside.least_rad())
     }
 
     /// The scatter between runs that a fit leaves, weighed on a grid.

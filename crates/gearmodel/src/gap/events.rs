@@ -77,8 +77,7 @@ pub(super) fn steps_cost_nats(steps: usize) -> f64 {
 /// have taken the steps for a drift.
 #[must_use]
 pub fn find(grid: &Grid, pool: &Pool, noise: &Noise, amplitudes: &[(usize, f64)], steady: &[(usize, f64)]) -> Events {
-    let rest = pool.rest(grid, amplitudes);
-    let mut steps: Vec<Vec<f64>> = Vec::new();
+    let mut found = Events::default();
     let mut look = |rest: &[f64]| {
         let sectors = sectors(grid, noise, rest);
         for tied in [false, true] {
@@ -87,20 +86,18 @@ pub fn find(grid: &Grid, pool: &Pool, noise: &Noise, amplitudes: &[(usize, f64)]
                 if times_s.len() <= FEW_STEPS {
                     times_s.iter_mut().for_each(|time_s| *time_s = off_the_edges(grid, *time_s));
                 }
-                if !steps.contains(&times_s) {
-                    steps.push(times_s);
+                if !found.steps.contains(&times_s) {
+                    found.steps.push(times_s);
                 }
             }
         }
+        found.patterns.extend(single_steps(grid, &sectors, rest));
     };
-    look(&rest);
-    let mut patterns = single_steps(grid, noise, &rest);
+    look(&pool.rest(grid, amplitudes));
     if steady.len() < amplitudes.len() {
-        let rest = pool.rest(grid, steady);
-        look(&rest);
-        patterns.extend(single_steps(grid, noise, &rest));
+        look(&pool.rest(grid, steady));
     }
-    Events { patterns, steps }
+    found
 }
 
 /// A step's time, moved to between two runs where it stands so near the end of one that it would only take off what is there.
@@ -122,12 +119,11 @@ fn off_the_edges(grid: &Grid, time_s: f64) -> f64 {
 }
 
 /// Steps of any size, one after the other, each where it takes most off the sectors' residual; one that is undone later counts as two.
-fn single_steps(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Pattern> {
-    let sectors = sectors(grid, noise, rest);
+fn single_steps(grid: &Grid, sectors: &[Sector], rest: &[f64]) -> Vec<Pattern> {
     let mut left: Vec<f64> = sectors.iter().map(|s| s.mean_rad).collect();
     let mut found = Vec::new();
     for _ in 0..SINGLE_STEPS {
-        let sums = Sums::new(&sectors, &left);
+        let sums = Sums::new(sectors, &left);
         let end = sectors.len();
         let stays = (1..end).map(|from| sums.stretch(from, end));
         let goes_back = (1..end).flat_map(|from| (from + SECTORS / 2..end).map(move |until| (from, until)));
@@ -187,6 +183,24 @@ impl Sums {
     }
 }
 
+/// Where among weighted values a step of a given size stands best: the first value that it raises.
+fn edge(values: impl Iterator<Item = (f64, f64)> + Clone, step_rad: f64) -> usize {
+    let (total, sum) = values.clone().fold((0.0, 0.0), |(total, sum), (w, y)| (total + w, sum + w * y));
+    let mean = sum / total;
+    let (mut after_weight, mut before_sum) = (total, 0.0);
+    let mut best = (f64::NEG_INFINITY, 0);
+    for (n, (weight, value)) in values.enumerate() {
+        // Least squares with a free level: gain = 2Δ Σ_after (e − mean) − Δ² w_after w_before/w, and Σ_after = −Σ_before.
+        let gain = -2.0 * step_rad * before_sum - step_rad * step_rad * after_weight * (total - after_weight) / total;
+        if gain > best.0 {
+            best = (gain, n);
+        }
+        after_weight -= weight;
+        before_sum += weight * (value - mean);
+    }
+    best.1
+}
+
 /// Moves each step to where the places about it say: a step has a sharp edge, and one that lies off by a sector fits worse
 /// than none.
 fn sharpen(grid: &Grid, rest: &[f64], times_s: &[f64], size_rad: f64) -> Vec<f64> {
@@ -213,22 +227,8 @@ fn sharpen(grid: &Grid, rest: &[f64], times_s: &[f64], size_rad: f64) -> Vec<f64
             // Size of all steps at this time.
             let together = times_s.iter().filter(|t| (*t - time_s).abs() < 1e-9).count() as f64;
             let step_rad = size_rad * together;
-            let mean = window.iter().map(|p| grid.weight[*p] * rest[*p]).sum::<f64>()
-                / window.iter().map(|p| grid.weight[*p]).sum::<f64>();
-            let total: f64 = window.iter().map(|p| grid.weight[*p]).sum();
-            let (mut after_weight, mut after_sum) = (total, 0.0);
-            let mut best = (f64::NEG_INFINITY, centre);
-            for (m, p) in window.iter().enumerate() {
-                // Least squares with a free level: gain = 2Δ Σ_after (e − mean) − Δ² w_after w_before/w.
-                let gain =
-                    2.0 * step_rad * -after_sum - step_rad * step_rad * after_weight * (total - after_weight) / total;
-                if gain > best.0 {
-                    best = (gain, low + m);
-                }
-                after_weight -= grid.weight[*p];
-                after_sum += grid.weight[*p] * (rest[*p] - mean);
-            }
-            let at = best.1.clamp(1, order.len() - 1);
+            let at = low + edge(window.iter().map(|p| (grid.weight[*p], rest[*p])), step_rad);
+            let at = at.clamp(1, order.len() - 1);
             0.5 * (grid.places[order[at - 1]].time_s + grid.places[order[at]].time_s)
         })
         .collect();
@@ -245,30 +245,16 @@ pub(super) fn settle(grid: &Grid, noise: &Noise, rest: &[f64], times_s: &[f64], 
         size_rad
             .unwrap_or_else(|| level_cost_with_size(&sectors, true, &sectors.iter().map(so_far).collect::<Vec<_>>()).2)
     };
-    let total: f64 = sectors.iter().map(|s| 1.0 / s.variance_rad2).sum();
     let mut times_s = times_s.to_vec();
     for _ in 0..SETTLING_PASSES {
         let (before, size_rad) = (times_s.clone(), size_of(&times_s));
         for n in 0..times_s.len() {
-            let so_far = |at_s: f64, times_s: &[f64]| times_s.iter().filter(|t| **t <= at_s).count() as f64;
             let without = |s: &Sector| {
-                let own = f64::from(u8::from(times_s[n] <= s.middle_s));
-                s.mean_rad - size_rad * (so_far(s.middle_s, &times_s) - own)
+                let others = times_s.iter().enumerate().filter(|(m, t)| *m != n && **t <= s.middle_s).count();
+                s.mean_rad - size_rad * others as f64
             };
-            let left: Vec<f64> = sectors.iter().map(without).collect();
-            let mean = left.iter().zip(&sectors).map(|(y, s)| y / s.variance_rad2).sum::<f64>() / total;
-            // Least squares with a free level, as where single steps are looked for.
-            let (mut after, mut after_sum) = (total, 0.0);
-            let mut best = (f64::NEG_INFINITY, 0);
-            for (m, (sector, y)) in sectors.iter().zip(&left).enumerate() {
-                let gain = 2.0 * size_rad * -after_sum - size_rad * size_rad * after * (total - after) / total;
-                if gain > best.0 {
-                    best = (gain, m);
-                }
-                after -= 1.0 / sector.variance_rad2;
-                after_sum += (y - mean) / sector.variance_rad2;
-            }
-            times_s[n] = sectors[best.1].start_s;
+            let at = edge(sectors.iter().map(|s| (1.0 / s.variance_rad2, without(s))), size_rad);
+            times_s[n] = sectors[at].start_s;
         }
         times_s.sort_by(f64::total_cmp);
         if times_s == before {

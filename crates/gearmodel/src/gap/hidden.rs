@@ -206,8 +206,7 @@ impl Engine<'_> {
                 break;
             }
         }
-        let alone = Search::new(&few, &noise.whiten(&self.grid, &few), &self.options.known, self.aside.least_rad())
-            .model(own, None)?;
+        let alone = self.search_in(&few, &noise.whiten(&self.grid, &few)).model(own, None)?;
         let room = if steady.len() < best.fit.set.len() { NEAR_NATS } else { NEARER_NATS };
         (alone.score > best.score - room).then_some(noise)
     }
@@ -217,8 +216,7 @@ impl Engine<'_> {
         let mut set = self.steady_set();
         set.push(block);
         let whitened = noise.whiten(&self.grid, &self.pool);
-        let with_event =
-            Search::new(&self.pool, &whitened, &self.options.known, self.aside.least_rad()).climb(set, Allowed::All);
+        let with_event = self.search_in(&self.pool, &whitened).climb(set, Allowed::All);
         if let Some(model) = with_event.filter(|model| self.best.as_ref().is_none_or(|best| model.score > best.score)) {
             self.best = Some(model);
             self.noise = noise;

@@ -240,12 +240,6 @@ impl Pool {
         self.columns.len()
     }
 
-    /// Causes of blocks.
-    #[must_use]
-    pub fn causes(&self, blocks: &[usize]) -> Vec<Cause> {
-        blocks.iter().map(|b| self.blocks[*b].cause.clone()).collect()
-    }
-
     /// Mean product of two columns over the samples, their means taken off.
     #[must_use]
     pub fn covariance(&self, m: usize, n: usize) -> f64 {

@@ -73,7 +73,7 @@ impl Engine<'_> {
     pub(super) fn report(&self, lines: &[LineError]) -> Option<Diagnosis> {
         let attribution = attribute::attribute(&self.pool, &self.models, SHARPNESS);
         let best = self.models.first()?;
-        let mut search = Search::new(&self.pool, &self.whitened, &self.options.known, self.aside.least_rad());
+        let mut search = self.search_in(&self.pool, &self.whitened);
         let mut findings = self.findings(&attribution, best, &mut search, lines);
 
         // Held-out shrink: of the best model, and of each effect alone.
