@@ -23,7 +23,6 @@ pub mod effect;
 mod errors;
 mod flank;
 mod free;
-pub mod gap;
 mod geometry_error;
 pub mod increment;
 pub mod loaded;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::effect::predict::Condition;
 use crate::effect::{Documented, StatedEffect};
-use crate::gap::predict::Condition;
 use crate::increment::common_normal;
 use crate::{Direction, Errors, GearPair, GeometryError, MeshPoint};
 

@@ -7,8 +7,8 @@ use serde::Deserialize;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 
 use super::PairFile;
+use crate::effect::predict::Found;
 use crate::effect::{LIBRARY, Stated, StatedEffect, Term, by_name};
-use crate::gap::predict::Found;
 use crate::{Errors, GeometryError};
 
 /// The table as it stands in the file.
@@ -169,8 +169,8 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
+    use crate::effect::predict::{Condition, FoundEffect};
     use crate::effect::{Estimate, Rig, Value};
-    use crate::gap::predict::{Condition, FoundEffect};
     use crate::{Direction, NominalModel};
 
     const PAIR: &str = "kind = \"elliptical\"\nmodule_mm = 3.0\nteeth = [47, 47]\neccentricity = 0.3287\n";

@@ -2,19 +2,18 @@
 
 use std::path::PathBuf;
 
+use diagnosis::{CampaignLogs, Options};
 use gearmodel::Direction;
-use gearmodel::gap::{self, Options};
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use riglog::CampaignLogs;
 
 use crate::array::Numbers;
 use crate::error::{Raised, Result};
 use crate::pair::GearPair;
 use crate::recording::Recording;
 
-impl From<gap::GapError> for Raised {
-    fn from(error: gap::GapError) -> Self {
+impl From<diagnosis::GapError> for Raised {
+    fn from(error: diagnosis::GapError) -> Self {
         pyo3::exceptions::PyValueError::new_err(error.to_string()).into()
     }
 }
@@ -22,8 +21,8 @@ impl From<gap::GapError> for Raised {
 /// The native half of a diagnosis.
 #[pyclass(frozen, module = "gearmodel._native", name = "NativeDiagnosis")]
 pub struct NativeDiagnosis {
-    diagnosis: gap::Diagnosis,
-    nominal: gap::Nominal,
+    diagnosis: diagnosis::Diagnosis,
+    nominal: diagnosis::Nominal,
 }
 
 #[pymethods]
@@ -35,12 +34,12 @@ impl NativeDiagnosis {
 
     /// A self-contained page.
     fn to_html(&self) -> String {
-        gap::html::page(&self.diagnosis)
+        diagnosis::html::page(&self.diagnosis)
     }
 
     /// The summary for people.
     fn summary(&self) -> String {
-        gap::summary::text(&self.diagnosis)
+        diagnosis::summary::text(&self.diagnosis)
     }
 
     /// (label, theta1_rad, before_rad, after_rad) of every run.
@@ -72,7 +71,7 @@ impl NativeDiagnosis {
         revolutions: f64,
     ) -> Result<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let direction: Direction = direction.parse()?;
-        let at = gap::predict::Condition { direction, load_nm, speed_rpm, time_s, revolutions };
+        let at = gearmodel::effect::predict::Condition { direction, load_nm, speed_rpm, time_s, revolutions };
         let found = &self.diagnosis.found;
         let theta1 = Numbers::take("theta1", theta1)?;
         let te = theta1
@@ -104,7 +103,7 @@ pub fn diagnose(
     let recordings = reads.iter().map(|read| read.recording()).collect::<Result<Vec<_>>>()?;
     let model = pair.get().model.clone();
     let options = Options { known, exclude };
-    let (diagnosis, nominal) = py.detach(|| gap::diagnose_with_nominal(&recordings, &model, &options))?;
+    let (diagnosis, nominal) = py.detach(|| diagnosis::diagnose_with_nominal(&recordings, &model, &options))?;
     Ok(NativeDiagnosis { diagnosis, nominal })
 }
 
@@ -122,10 +121,10 @@ pub fn diagnose_logs(
     let options = Options { known, exclude };
     py.detach(|| {
         let logs = CampaignLogs::open(&paths)?;
-        let nominal = gap::Nominal::new(logs.rig(model));
+        let nominal = diagnosis::Nominal::new(logs.rig(model));
         let reduced = logs.reduce(&nominal)?;
         let incomplete = reduced.incomplete();
-        let diagnosis = gap::diagnose_runs(&nominal, reduced.runs, &options)?;
+        let diagnosis = diagnosis::diagnose_runs(&nominal, reduced.runs, &options)?;
         Ok((NativeDiagnosis { diagnosis, nominal }, incomplete))
     })
 }

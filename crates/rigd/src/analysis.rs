@@ -1,6 +1,6 @@
 //! TE and backlash of a whole log: the same code for the live rig and for a replay, so that both give the same bits.
 
-use gearmodel::gap::predict::Condition;
+use gearmodel::effect::predict::Condition;
 use gearmodel::measure::{AngleGrid, BacklashCurve, Curve, RunConditions, RunTe, TePoint};
 use gearmodel::{Direction, NominalModel};
 use sha2::{Digest as _, Sha256};

@@ -3,10 +3,9 @@
 //!
 //! Reading order: [`cli`] (what a person asks for) → [`run`] (a session from connecting to the finalised log) → [`device`]
 //! (drivers) over [`link`] (bytes) → [`analysis`] (TE and backlash, the same for live and replay) → [`summary`], [`plot`].
-//! [`sim`] is the rig as a simulation that answers the same bytes; [`blind`] withholds what was wrong with it, and scores who finds it.
+//! [`simulated`] puts the rig of the crate `rigsim`, which answers the same bytes, in the place of a real one.
 
 pub mod analysis;
-pub mod blind;
 pub mod calibration;
 pub mod campaign;
 pub mod chart;
@@ -14,9 +13,7 @@ pub mod cli;
 pub mod clock;
 pub mod device;
 pub mod doctor;
-pub mod gap;
 pub mod link;
-pub mod pair;
 pub mod plot;
 pub mod present;
 pub mod profile;
@@ -24,5 +21,5 @@ pub mod quantity;
 pub mod replay;
 pub mod run;
 pub mod service;
-pub mod sim;
+pub mod simulated;
 pub mod summary;

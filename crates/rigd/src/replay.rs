@@ -10,7 +10,7 @@ use riglog::{LogError, LogParts, RunSpan, RunStream, RunTotals, RunVisitor, Samp
 use thiserror::Error;
 
 use crate::analysis::Analysis;
-use crate::pair::{self, PairError};
+use riglog::pair::{self, PairError};
 
 /// Why a log cannot be replayed.
 #[derive(Debug, Error)]

@@ -22,7 +22,7 @@ fn log(directory: &Path, toml: &str, turns: u32, te_rad: impl Fn(f64) -> f64) ->
     const ROWS: u32 = 7200;
     let path = |name: &str| directory.join(name).display().to_string();
     std::fs::write(path("pair.toml"), toml).expect("a pair");
-    let model = rigd::pair::parse(toml, Path::new("pair.toml")).expect("a pair");
+    let model = riglog::pair::parse(toml, Path::new("pair.toml")).expect("a pair");
     let mut table = "time_s,theta1_rad,theta2_rad,load_nm,speed_rpm,direction\n".to_owned();
     for n in 0..turns * ROWS {
         let theta1 = TAU * (f64::from(n) + 0.5) / f64::from(ROWS);
@@ -56,7 +56,7 @@ const ELLIPSE: &str = "kind = \"elliptical\"\nmodule_mm = 3.0\nteeth = [47, 47]\
 #[test]
 fn waves_of_each_axis_are_found_and_parted() {
     let directory = TempDir::new().expect("a directory");
-    let model = rigd::pair::parse(ELLIPSE, Path::new("pair.toml")).expect("a pair");
+    let model = riglog::pair::parse(ELLIPSE, Path::new("pair.toml")).expect("a pair");
     let tooth = |theta1: f64| TAU * model.pair.tooth_phase(theta1).expect("teeth");
     let log = log(directory.path(), ELLIPSE, 4, |theta1| 1e-3 * (2.0 * theta1).cos() + 1e-4 * tooth(theta1).cos());
     let found = analysed(&[&log, "--bins", "1440", "--split", "mesh:0.3"]);

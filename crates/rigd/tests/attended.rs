@@ -11,8 +11,7 @@ use async_trait::async_trait;
 use gearmodel::measure::RunFigures;
 use rigd::analysis::Analysis;
 use rigd::device::bus::BusStatistics;
-use rigd::device::{DeviceError, Identity, Part, Servo, ServoStatus};
-use rigd::pair;
+use rigd::device::{DeviceError, DeviceKind, Identity, Servo, ServoStatus};
 use rigd::run::acquire::Acquisition;
 use rigd::run::attend::{Nobody, Policy, Suspend, attend};
 use rigd::run::halt::Halt;
@@ -21,7 +20,8 @@ use rigd::run::reconnect::Dialer;
 use rigd::run::rig::Rig;
 use rigd::run::session;
 use rigd::run::supervisor::State;
-use rigd::sim;
+use rigd::simulated;
+use riglog::pair;
 use riglog::{LogReader, Record};
 use support::bench::{Bench, in_virtual_time};
 use tokio::time::{Instant, sleep};
@@ -33,7 +33,7 @@ fn residual_urad(analysis: &Analysis, run: usize) -> f64 {
 }
 
 /// Pulls a plug while the rig records, puts it in again after `out_s`, and checks what must be so for every device.
-fn replugged(part: Part, restart: bool, seed: u64) -> Bench {
+fn replugged(part: DeviceKind, restart: bool, seed: u64) -> Bench {
     in_virtual_time(async {
         let bench = Bench::new(seed);
         let (pulled, put_in) = (Rc::new(RefCell::new(0)), Rc::new(RefCell::new(0)));
@@ -74,7 +74,7 @@ fn replugged(part: Part, restart: bool, seed: u64) -> Bench {
         println!("  residual {before:.2} µrad before, {after:.2} µrad after, {} samples lost", found.losses);
         assert!(after < 10.0, "TE goes on as it was: {after} µrad");
         assert_eq!(found.losses, outcome.lost);
-        if part == Part::Counter {
+        if part == DeviceKind::Counter {
             assert!(outcome.lost > 0);
         } else {
             assert_eq!(outcome.lost, 0, "the encoders went on");
@@ -85,14 +85,14 @@ fn replugged(part: Part, restart: bool, seed: u64) -> Bench {
 
 #[test]
 fn a_servo_or_brake_that_is_unplugged_and_comes_back() {
-    replugged(Part::Servo, false, 1);
-    replugged(Part::Brake, false, 2);
+    replugged(DeviceKind::Servo, false, 1);
+    replugged(DeviceKind::Brake, false, 2);
 }
 
 #[test]
 fn a_counter_that_comes_back_leaves_a_marked_gap_and_nothing_in_it() {
     for (restart, seed) in [(false, 3), (true, 4)] {
-        let bench = replugged(Part::Counter, restart, seed);
+        let bench = replugged(DeviceKind::Counter, restart, seed);
         // The gap is in the numbers and in the times alike, and no sample or TE point lies in it.
         let (mut gaps, mut end) = (Vec::new(), None);
         let mut points = Vec::new();
@@ -131,7 +131,7 @@ fn a_device_that_stays_away_ends_the_run_with_its_name() {
         let hands = bench.clone();
         tokio::task::spawn_local(async move {
             hands.at_speed(2.0).await;
-            hands.world.borrow_mut().unplug(Part::Brake);
+            hands.world.borrow_mut().unplug(DeviceKind::Brake);
         });
         let outcome = bench.run(bench.job(20.0), Policy { reconnect_s: 10.0, suspend: None }).await;
         let said = outcome.halt.expect("a halt").to_string();
@@ -279,7 +279,7 @@ fn a_servo_lost_for_good_is_held_by_the_brake_until_its_heat_is_spent() {
             let bench = bench.clone();
             tokio::task::spawn_local(async move {
                 bench.at_speed(2.0).await;
-                bench.world.borrow_mut().unplug(Part::Servo);
+                bench.world.borrow_mut().unplug(DeviceKind::Servo);
                 let unplugged = Instant::now();
                 // Without a watchdog the motor drives on: the load must stay on it.
                 while bench.brake_torque_nm() > 5.0 {
@@ -310,10 +310,10 @@ fn a_servo_without_watchdog_that_comes_back_while_the_brake_holds_is_stopped_at_
             let bench = bench.clone();
             tokio::task::spawn_local(async move {
                 bench.at_speed(2.0).await;
-                bench.world.borrow_mut().unplug(Part::Servo);
+                bench.world.borrow_mut().unplug(DeviceKind::Servo);
                 sleep(Duration::from_secs(20)).await;
                 assert!(bench.speed_rpm() > 10.0 && bench.brake_torque_nm() > 5.0, "turns on under load");
-                bench.world.borrow_mut().replug(Part::Servo);
+                bench.world.borrow_mut().replug(DeviceKind::Servo);
                 sleep(Duration::from_secs_f64(0.5 + 0.6 + 2.0)).await;
                 assert!(bench.speed_rpm() < 0.1, "stopped by its ramp");
             })
@@ -378,7 +378,7 @@ fn with_defect(defect: Defect, seed: u64) -> (Option<Halt>, Vec<String>, f64) {
         let (_, model) = pair::load(None).expect("the built-in pair");
         let recorder = bench.recorder();
         let acquisition = Rc::new(RefCell::new(Acquisition::new(recorder, bench.clock, Analysis::new(model))));
-        let links = sim::links_to(&bench.world);
+        let links = simulated::links_to(&bench.world);
         let dialer = Dialer::new(bench.profile.clone(), links.again.clone());
         let mut devices = session::connect(&dialer, links).await.expect("the devices");
         // Some 6 s into the run, at speed.

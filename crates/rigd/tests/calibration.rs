@@ -5,7 +5,7 @@ mod support;
 
 use rigd::calibration::Calibration;
 use rigd::profile::Profile;
-use rigd::sim::plant::{BrakeSpec, PlantSpec};
+use rigsim::plant::{BrakeSpec, PlantSpec};
 use support::desk::Desk;
 
 /// (rising, falling) torque of the plant at a current, N·m, by the points of its own curve.
@@ -126,7 +126,7 @@ fn a_disc_turned_on_its_shaft_tells_its_own_errors_from_everything_elses() {
         let told = desk.json(0, &format!("calibrate encoder {which} {logs} --out @/calibration.toml --json"));
         // The plant's own disc.
         let mut spec = PlantSpec::default();
-        rigd::sim::plant::undocumented::find(effect).expect("an effect").apply_usual(&mut spec);
+        rigsim::plant::undocumented::find(effect).expect("an effect").apply_usual(&mut spec);
         let disc = if which == "input" { &spec.encoders.input } else { &spec.encoders.output };
         let orders = told["disc"]["orders"].as_array().expect("orders");
         let order = |wanted: f64| {
@@ -150,8 +150,8 @@ fn a_disc_turned_on_its_shaft_tells_its_own_errors_from_everything_elses() {
         let snippet = told["documented"].as_str().expect("a snippet");
         assert!(snippet.contains(effect), "{snippet}");
         // The snippet is what the pair file takes.
-        let pair = format!("{}\n{snippet}", rigd::profile::DEFAULT_PAIR);
-        rigd::pair::parse(&pair, "pair.toml".as_ref()).expect("a pair");
+        let pair = format!("{}\n{snippet}", riglog::pair::DEFAULT_PAIR);
+        riglog::pair::parse(&pair, "pair.toml".as_ref()).expect("a pair");
         assert!(std::fs::read_to_string(desk.at("calibration.toml")).expect("a file").contains(key));
         // One place of the disc tells nothing.
         let one = logs.split(' ').next().expect("a log");

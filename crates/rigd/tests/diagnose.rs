@@ -165,7 +165,7 @@ fn a_written_model_explains_a_fresh_run_and_the_old_one_does_not() {
         assert_eq!(object["runs"].as_array().map(Vec::len), Some(4));
     }
     let old = directory.path().join("old.toml");
-    std::fs::write(&old, rigd::profile::DEFAULT_PAIR).expect("a pair");
+    std::fs::write(&old, riglog::pair::DEFAULT_PAIR).expect("a pair");
     let (code, object) = verified(&["--model", text(&old)]);
     assert_eq!((code, &object["passed"]), (Some(3), &false.into()));
     assert!(object["runs"].as_array().expect("runs").iter().all(|row| number(&row["ratio"]) > 10.0), "{object}");
@@ -182,7 +182,7 @@ fn an_effect_that_depends_on_speed_is_documented_as_a_table() {
     let directory = TempDir::new().expect("a directory");
     let log = run(directory.path(), &["--undocumented", "time_skew"]);
     let pair = directory.path().join("pair.toml");
-    let text_of = |dt_s: &str| format!("{}\n[documented.time_skew]\ndt_s = {dt_s}\n", rigd::profile::DEFAULT_PAIR);
+    let text_of = |dt_s: &str| format!("{}\n[documented.time_skew]\ndt_s = {dt_s}\n", riglog::pair::DEFAULT_PAIR);
     // What the simulated rig puts there: 60 µs.
     std::fs::write(&pair, text_of("6e-5")).expect("a pair");
     let known = diagnosed(&[text(&log), "--pair", text(&pair)]);
@@ -236,8 +236,7 @@ fn what_cannot_be_diagnosed_is_refused_with_what_to_do() {
     refused(&["diagnose", log, "--known", "gear3"], 2, &["gear3", "gear2_eccentricity"]);
     refused(&["diagnose", log, "--known", "slip", "--exclude", "slip"], 2, &["slip", "both"]);
     let pair = directory.path().join("wrong.toml");
-    std::fs::write(&pair, format!("{}\n[documented.time_skew]\ndt = 1\n", rigd::profile::DEFAULT_PAIR))
-        .expect("a pair");
+    std::fs::write(&pair, format!("{}\n[documented.time_skew]\ndt = 1\n", riglog::pair::DEFAULT_PAIR)).expect("a pair");
     refused(&["diagnose", log, "--pair", text(&pair)], 2, &["wrong.toml", "time_skew", "`dt`", "`dt_s`"]);
     refused(&["verify", log, "--model", text(&pair)], 2, &["wrong.toml", "`dt_s`"]);
     let other = directory.path().join("other.toml");

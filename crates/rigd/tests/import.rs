@@ -30,7 +30,7 @@ struct Desk {
 impl Desk {
     fn new() -> Self {
         let directory = TempDir::new().expect("a temporary directory");
-        let (text, model) = rigd::pair::load(None).expect("the built-in pair");
+        let (text, model) = riglog::pair::load(None).expect("the built-in pair");
         std::fs::write(directory.path().join("pair.toml"), text).expect("a pair");
         Self { directory, model }
     }

@@ -49,7 +49,7 @@ fn an_exported_log_comes_back_with_the_same_te_bit_by_bit() {
     desk.profile(|_| {});
     let ran = desk.json(0, RUN);
     let log = desk.logs("runs").remove(0);
-    std::fs::write(desk.at("pair.toml"), rigd::profile::DEFAULT_PAIR).expect("a file");
+    std::fs::write(desk.at("pair.toml"), riglog::pair::DEFAULT_PAIR).expect("a file");
     let mut formats = vec!["csv"];
     if cfg!(feature = "parquet") {
         formats.push("parquet");

@@ -19,7 +19,8 @@ use rigd::run::reconnect::Dialer;
 use rigd::run::rig::Rig;
 use rigd::run::session::{self, Frame};
 use rigd::run::set_up::hold_brake;
-use rigd::{pair, sim};
+use rigd::simulated;
+use riglog::pair;
 use serde_json::Value;
 use support::bench::{Bench, events, in_virtual_time};
 use support::{Ended, Run, Sim, rigd, wait_for};
@@ -166,7 +167,7 @@ fn the_doctors_turn_without_a_watchdog_too() {
                 })
             };
             let consent = Consent { turn: true, no_watchdog };
-            let report = doctor::examine(&bench.profile, sim::links_to(&bench.world), consent, &bench.stop).await;
+            let report = doctor::examine(&bench.profile, simulated::links_to(&bench.world), consent, &bench.stop).await;
             look.abort();
             let grade = |subject: &str| report.findings.iter().find(|one| one.subject == subject).map(|one| one.grade);
             let watchdog = if no_watchdog { Grade::Warning } else { Grade::Fault };
@@ -232,7 +233,7 @@ fn held_against_a_turning_gear(seconds: f64) -> (Option<Halt>, f64) {
         let mut bench = Bench::new(12);
         bench.profile.limits.slip_power_w = 25.0;
         let hands = {
-            let (bench, links) = (bench.clone(), sim::links_to(&bench.world));
+            let (bench, links) = (bench.clone(), simulated::links_to(&bench.world));
             tokio::task::spawn_local(async move {
                 let mut servo = Dialer::new(bench.profile.clone(), links.again.clone())
                     .servo(links.servo)
@@ -253,7 +254,7 @@ fn held_against_a_turning_gear(seconds: f64) -> (Option<Halt>, f64) {
             model,
             recorder: bench.recorder(),
             progress: Progress::new(0.0, true),
-            links: sim::links_to(&bench.world),
+            links: simulated::links_to(&bench.world),
             clock: bench.clock,
             stop: bench.stop.clone(),
         };

@@ -16,11 +16,12 @@ use rigd::campaign::estimate::estimate;
 use rigd::campaign::journal::Journal;
 use rigd::campaign::plan::CampaignPlan;
 use rigd::campaign::schedule::Schedule;
-use rigd::device::Part;
+use rigd::device::DeviceKind;
 use rigd::run::attend::Policy;
 use rigd::run::job::Job;
 use rigd::run::session::{self, LogHead, Work};
-use rigd::{pair, sim};
+use rigd::simulated;
+use riglog::pair;
 use riglog::{LogReader, Record};
 use support::bench::{Bench, events, in_virtual_time};
 use tokio::time::sleep;
@@ -52,7 +53,7 @@ async fn disturb(bench: Bench, done: Rc<RefCell<Done>>, seed: u64) {
         let what = within(0, 8).as_secs();
         match what {
             0..=3 => {
-                let part = Part::ALL[what as usize % 3];
+                let part = DeviceKind::ALL[what as usize % 3];
                 done.borrow_mut().unplugged[part as usize] += 1;
                 bench.world.borrow_mut().unplug(part);
                 sleep(within(0, 20)).await;
@@ -60,10 +61,10 @@ async fn disturb(bench: Bench, done: Rc<RefCell<Done>>, seed: u64) {
             }
             4 => {
                 done.borrow_mut().restarted += 1;
-                bench.world.borrow_mut().unplug(Part::Counter);
+                bench.world.borrow_mut().unplug(DeviceKind::Counter);
                 bench.world.borrow_mut().restart_counter();
                 sleep(within(1, 5)).await;
-                bench.world.borrow_mut().replug(Part::Counter);
+                bench.world.borrow_mut().replug(DeviceKind::Counter);
             }
             5 => {
                 done.borrow_mut().pressed += 1;
@@ -171,7 +172,7 @@ fn soak(hours: f64, seed: u64) {
         let policy = Policy { reconnect_s: plan.reconnect_s, suspend: plan.suspend() };
         let job = Job::new(runs.clone(), plan.rate_hz, 0);
         let work = Work { profile: bench.profile.clone(), model, job, policy, quiet: true };
-        let links = sim::links_to(&bench.world);
+        let links = simulated::links_to(&bench.world);
         let began = bench.clock.now_ns();
         let outcome = session::conduct(work, recorder, &mut conductor, links, bench.clock, bench.stop.clone()).await;
         let took_h = (bench.clock.now_ns() - began) as f64 / 3.6e12;

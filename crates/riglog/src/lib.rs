@@ -5,19 +5,19 @@
 //! - [`RotatingWriter`] splits a long log into parts without losing a sample; [`LogParts`] finds the parts of one log.
 //! - [`audit()`] checks checksums, sequence and clock; [`Follower`] reads a log that is being written.
 //! - [`recover()`] finalises what a killed writer left.
-//! - [`info()`] says what is in a log; [`RunStream`] and [`read_runs`] give its runs as shaft angles, [`CampaignLogs`] those of
-//!   several logs as points for the gap diagnosis.
+//! - [`info()`] says what is in a log; [`RunStream`] and [`read_runs`] give its runs as shaft angles.
+//! - [`pair`] reads the gear pair that a log carries, or a file.
 //!
 //! Messages and their units are those of `proto/rig.proto`; times are ns since the Unix epoch.
 
 mod audit;
 mod batch;
-mod campaign;
 mod completeness;
 mod error;
 mod follow;
 mod info;
 mod metadata;
+pub mod pair;
 mod parts;
 pub mod proto;
 mod reader;
@@ -32,12 +32,12 @@ mod write;
 
 pub use audit::{Audit, Finding, FindingKind, audit};
 pub use batch::BatchBuilder;
-pub use campaign::{CampaignLogs, ReducedLogs};
 pub use completeness::{Completeness, Defect};
 pub use error::{BatchError, LogError};
 pub use follow::{Follower, Following};
 pub use info::{AttachmentInfo, ChannelInfo, LogInfo, RunInfo, info};
 pub use metadata::{AngleScale, EncoderMetadata, MetadataMap, RunMetadata};
+pub use pair::PairError;
 pub use parts::{LogParts, PartMetadata, part_path};
 pub use reader::{LogReader, Record};
 pub use recover::{RecoveredFile, Recovery, recover, recover_directory};

@@ -16,6 +16,7 @@
 
 pub mod asda_b2;
 pub mod counter_box;
+mod device_kind;
 pub mod dsp7000;
 mod hex;
 pub mod modbus;
@@ -23,4 +24,5 @@ pub mod qsb;
 pub mod rd60xx;
 pub mod register_map;
 
+pub use device_kind::DeviceKind;
 pub use hex::Hex;

@@ -5,7 +5,7 @@
 use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
 
 /// Names by encoder: these effects are found on the samples, not on the places.
-pub(crate) const NAMES: [&str; 2] = ["encoder1_interpolation", "encoder2_interpolation"];
+pub const NAMES: [&str; 2] = ["encoder1_interpolation", "encoder2_interpolation"];
 
 /// Interpolation error of the input or output encoder.
 pub(super) struct EncoderInterpolation(pub(super) Shaft);

@@ -30,6 +30,7 @@ mod phasing_error;
 mod pitch_curve_error;
 mod pitch_errors;
 mod polar;
+pub mod predict;
 mod profile_error;
 mod rig;
 mod shaft_compliance;
@@ -50,7 +51,7 @@ pub use signature::{Accumulates, Carrier, Parity, Signature};
 pub use stated::{Given, Stated, StatedEffect, StatedError};
 pub use station::{Grain, LEDGER_LOADS, Ledger, Plan, Station};
 
-pub(crate) use encoder_interpolation::NAMES as INTERPOLATION;
+pub use encoder_interpolation::NAMES as INTERPOLATION;
 
 use encoder_disc::{EncoderDisc, Order};
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::MeasureError;
 use super::grid::{AngleGrid, Curve};
 use crate::NominalModel;
-use crate::gap::predict::Condition;
+use crate::effect::predict::Condition;
 
 /// Backlash over θ1 at the driven shaft, rad: TE_cw − TE_ccw at equal θ1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::grid::{AngleGrid, Curve, mean};
 use super::order::Order;
 use super::run_te::RunTe;
-use crate::gap::predict::Condition;
+use crate::effect::predict::Condition;
 use crate::{GearPair, NominalModel};
 
 /// Highest order of θ1 that the figures state.

@@ -2,7 +2,6 @@
 
 #![allow(clippy::unwrap_used)] // helpers of tests may
 
-mod growing;
 mod ringing;
 mod signatures;
 
@@ -598,6 +597,22 @@ fn stiffness_varies_about_its_mean_where_the_teeth_change() {
             let at = station(&rig, pair.theta1_at_arc_length((3.0 + half) * pair.pitch_mm().unwrap()), direction);
             for shape in [vec![0.3, -0.15], vec![]] {
                 assert!(row(&rig, "mesh_stiffness_variation", &shape, &at)[0] * direction.sign() < 0.0, "{shape:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn heat_grows_the_centre_distance_and_saturates() {
+    for pair in toothed() {
+        let (rig, tau_s) = (rig(&pair), 40.0);
+        for (theta, direction) in places(20) {
+            let mut at = station(&rig, theta, direction);
+            let full = row(&rig, "centre_distance_error", &[], &at)[0];
+            for (time_s, share) in [(0.0, 0.0), (tau_s, 1.0 - (-1.0_f64).exp()), (1e5, 1.0)] {
+                at.time_s = time_s;
+                at.load_nm = 3.0 + time_s;
+                assert!((row(&rig, "thermal_drift", &[tau_s], &at)[0] - share * full).abs() < 1e-12);
             }
         }
     }

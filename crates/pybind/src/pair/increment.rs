@@ -1,7 +1,7 @@
 //! TE and backlash by method: which function of the model answers.
 
 use gearmodel::contact::{ContactError, ContactModel};
-use gearmodel::gap::predict::Condition;
+use gearmodel::effect::predict::Condition;
 use gearmodel::increment::published;
 use gearmodel::sensitivity::Parameter;
 use gearmodel::{Direction, NominalModel};

@@ -8,14 +8,14 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Exit, fail, print};
-use crate::blind::draw::Baselines;
-use crate::blind::family::Family;
-use crate::blind::score::Score;
-use crate::blind::seal::Sealed;
-use crate::blind::set::SetPlan;
-use crate::blind::verdict::{Outcome, judge};
-use crate::blind::{ask, log, page, report};
-use crate::pair;
+use blindtest::draw::Baselines;
+use blindtest::family::Family;
+use blindtest::score::Score;
+use blindtest::seal::Sealed;
+use blindtest::set::SetPlan;
+use blindtest::verdict::{Outcome, judge};
+use blindtest::{ask, log, page, report};
+use riglog::pair;
 
 /// Make withheld cases on the simulated rig, diagnose them, and score what was said against what was wrong.
 #[derive(Debug, clap::Args)]

@@ -25,7 +25,8 @@ use crate::run::job::Job;
 use crate::run::keys::Keys;
 use crate::run::session::{self, Links, LogHead, Outcome, Work};
 use crate::run::stop::StopRequests;
-use crate::{pair, sim};
+use crate::simulated::{self, PlantSpec};
+use riglog::pair;
 
 const PLAN: &str = "A plan:
   name = \"…\"  operator = \"…\"  note = \"…\"  rate_hz = 10000.0  repeats = 1  order = \"as-written\" or \"random\"  seed = 1  reconnect_s = 300.0
@@ -88,7 +89,7 @@ struct Prepared {
     profile: Profile,
     pair_toml: String,
     model: NominalModel,
-    spec: Option<sim::PlantSpec>,
+    spec: Option<PlantSpec>,
     schedule: Schedule,
 }
 
@@ -132,8 +133,8 @@ fn prepare(args: &Args) -> Result<Prepared, Box<dyn std::error::Error>> {
     plan.check(&profile, &args.plan)?;
     let (pair_toml, model) = pair::load(args.pair.as_deref())?;
     let spec = if profile.in_process() {
-        let mut spec = sim::spec(&model, &args.undocumented)?;
-        sim::mount_discs(&mut spec, &profile);
+        let mut spec = simulated::spec(&model, &args.undocumented)?;
+        simulated::mount_discs(&mut spec, &profile);
         Some(spec)
     } else {
         None
@@ -247,7 +248,7 @@ fn execute(args: &Args, prepared: Prepared, directory: &Path, journal: Journal) 
         let mut simulator = None;
         let links = match &spec {
             Some(spec) if in_process => {
-                sim::start_in_process(spec, plan.rate_hz, seed).map_err(|error| error.to_string())?
+                simulated::start_in_process(spec, plan.rate_hz, seed).map_err(|error| error.to_string())?
             }
             Some(_) => {
                 let started = Simulator::start(seed, args.pair.as_deref(), &args.undocumented)?;

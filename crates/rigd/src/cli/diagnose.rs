@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use diagnosis::{Diagnosis, GapError, Options};
 use gearmodel::PairFile;
-use gearmodel::gap::{self, Diagnosis, GapError, Options};
 
 use super::{Exit, fail, print};
-use crate::gap::{Diagnosed, Logs, LogsError};
+use diagnosis::logs::{Diagnosed, Logs, LogsError};
 
 /// Residual over floor from which there is a gap that an answer is owed for.
 const CLEAR_GAP: f64 = 1.2;
@@ -55,7 +55,7 @@ pub fn main(args: &Args) -> Exit {
         Err(error) => return fail(Exit::BadInput, &error),
     };
     let Diagnosed { diagnosis, incomplete } = &diagnosed;
-    print(&if args.json { diagnosis.to_json() } else { gap::summary::text(diagnosis).trim_end().to_owned() });
+    print(&if args.json { diagnosis.to_json() } else { diagnosis::summary::text(diagnosis).trim_end().to_owned() });
     for line in logs.notes.iter().chain(incomplete) {
         eprintln!("warning: {line}");
     }
@@ -82,7 +82,7 @@ fn unanswered(diagnosis: &Diagnosis) -> bool {
 
 fn write_files(args: &Args, pair: &PairFile, diagnosis: &Diagnosis) -> Result<(), Exit> {
     if let Some(path) = &args.html {
-        write("--html", path, &gap::html::page(diagnosis))?;
+        write("--html", path, &diagnosis::html::page(diagnosis))?;
     }
     if let Some(path) = &args.write_model {
         let (model, left_out) = match pair.with_found(&diagnosis.found) {

@@ -9,7 +9,8 @@ use crate::doctor::{self, Consent, Grade, Report};
 use crate::profile::Profile;
 use crate::run::session::Links;
 use crate::run::stop::StopRequests;
-use crate::{pair, sim};
+use crate::simulated;
+use riglog::pair;
 
 /// Look at ports, devices, watchdog and encoders, and say what to do; nothing moves without --turn.
 #[derive(Debug, clap::Args)]
@@ -57,8 +58,8 @@ pub fn main(args: &Args) -> Exit {
 
 fn simulated_links() -> Result<Links, String> {
     let (_, model) = pair::load(None).map_err(|error| error.to_string())?;
-    let spec = sim::spec(&model, &[]).map_err(|error| error.to_string())?;
-    sim::start_in_process(&spec, sim::world::IDLE_RATE_HZ, 1).map_err(|error| error.to_string())
+    let spec = simulated::spec(&model, &[]).map_err(|error| error.to_string())?;
+    simulated::start_in_process(&spec, rigsim::world::IDLE_RATE_HZ, 1).map_err(|error| error.to_string())
 }
 
 fn show(args: &Args, profile: &Profile, report: &Report) -> Exit {

@@ -17,7 +17,7 @@ use serde_json::json;
 use thiserror::Error;
 
 use super::{Exit, fail, print};
-use crate::pair;
+use riglog::pair;
 use row::{Row, Table};
 
 /// Write the samples of a log as a table

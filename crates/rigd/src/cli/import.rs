@@ -18,13 +18,13 @@ use serde::Serialize;
 
 use super::{Exit, fail, print};
 use crate::analysis::Analysis;
-use crate::pair;
 use crate::present::{angle, arcsec};
 use crate::quantity::{SPEED, TORQUE};
 use crate::summary::{Origin, Summary};
 use csv_table::CsvTable;
 use error::ImportError;
 use log::{Imported, Importer, encoders};
+use riglog::pair;
 use rows::{Row, Stated};
 
 /// Make a log from a table of angles.

@@ -14,7 +14,7 @@ use crate::run::recorder::Recorder;
 use crate::run::rig::Rig;
 use crate::run::session::{self, Frame, Links, LogHead, Outcome};
 use crate::run::stop::StopRequests;
-use crate::sim;
+use crate::simulated;
 
 /// A rig, and what the log says of the work on it.
 pub struct OnRig {
@@ -47,9 +47,9 @@ pub fn on_rig(work: OnRig, body: impl AsyncFnOnce(&mut Rig) -> (Option<Halt>, Ve
     LocalSet::new().block_on(&runtime, async {
         let stop = StopRequests::listen().map_err(|error| format!("signals: {error}"))?;
         let links = if simulated {
-            let mut spec = sim::spec(&work.model, &[]).map_err(|error| error.to_string())?;
-            sim::mount_discs(&mut spec, &work.profile);
-            sim::start_in_process(&spec, work.rate_hz, work.seed).map_err(|error| error.to_string())?
+            let mut spec = simulated::spec(&work.model, &[]).map_err(|error| error.to_string())?;
+            simulated::mount_discs(&mut spec, &work.profile);
+            simulated::start_in_process(&spec, work.rate_hz, work.seed).map_err(|error| error.to_string())?
         } else {
             Links::default()
         };

@@ -9,6 +9,7 @@ use super::directions::Directions;
 use super::simulator::Simulator;
 use super::{Exit, fail, print, stop};
 use crate::clock::Clock;
+use crate::plot;
 use crate::profile::{Profile, SLOWEST_RPM};
 use crate::quantity::{RATE, SPEED, TORQUE};
 use crate::run::Plan;
@@ -17,8 +18,9 @@ use crate::run::keys::Keys;
 use crate::run::rig::slip_power_w;
 use crate::run::session::{self, Links, Outcome, Setup};
 use crate::run::stop::StopRequests;
+use crate::simulated::{self, PlantSpec};
 use crate::summary::{Origin, Summary};
-use crate::{pair, plot, sim};
+use riglog::pair;
 
 /// Slower slip than this makes powder brakes stick and slip, rpm.
 const STICK_SLIP_RPM: f64 = 10.0;
@@ -143,7 +145,7 @@ enum Refusal {
 /// Runs the command.
 pub fn main(args: &Args) -> Exit {
     if args.undocumented.iter().any(|name| name == "list") {
-        print(&sim::describe_undocumented());
+        print(&simulated::describe_undocumented());
         return Exit::Done;
     }
     let (setup, spec) = match prepare(args) {
@@ -164,7 +166,7 @@ pub fn main(args: &Args) -> Exit {
     exit
 }
 
-fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::error::Error>> {
+fn prepare(args: &Args) -> Result<(Setup, Option<PlantSpec>), Box<dyn std::error::Error>> {
     let mut profile = match &args.profile {
         Some(path) => Profile::load(path)?,
         None => Profile::simulated(),
@@ -183,8 +185,11 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
         accept_no_watchdog: args.accept_no_watchdog,
     };
     refuse(&profile, &plan)?;
-    if let Some(name) = args.undocumented.iter().find(|name| !sim::is_undocumented(name)) {
-        return Err(Box::new(Refusal::Effect { name: name.clone(), known: sim::undocumented_names().join(", ") }));
+    if let Some(name) = args.undocumented.iter().find(|name| !simulated::is_undocumented(name)) {
+        return Err(Box::new(Refusal::Effect {
+            name: name.clone(),
+            known: simulated::undocumented_names().join(", "),
+        }));
     }
     let simulated = [&profile.servo.port, &profile.brake.port, &profile.counter.port]
         .iter()
@@ -203,8 +208,8 @@ fn prepare(args: &Args) -> Result<(Setup, Option<sim::PlantSpec>), Box<dyn std::
     let spec = if profile.in_process() {
         let (plant_toml, plant) = pair::load(args.pair.as_deref())?;
         same_gears(args, &plant_toml, &pair_toml)?;
-        let mut spec = sim::spec(&plant, &args.undocumented)?;
-        sim::mount_discs(&mut spec, &profile);
+        let mut spec = simulated::spec(&plant, &args.undocumented)?;
+        simulated::mount_discs(&mut spec, &profile);
         Some(spec)
     } else {
         None
@@ -333,7 +338,7 @@ fn warnings(setup: &Setup) -> Vec<String> {
     warnings
 }
 
-fn execute(args: &Args, setup: Setup, spec: Option<sim::PlantSpec>) -> Exit {
+fn execute(args: &Args, setup: Setup, spec: Option<PlantSpec>) -> Exit {
     let seed = args.seed.unwrap_or(1);
     match spec {
         None => in_runtime(args, setup, Time::Real, |_| Ok((Links::default(), None))),
@@ -343,7 +348,8 @@ fn execute(args: &Args, setup: Setup, spec: Option<sim::PlantSpec>) -> Exit {
             Ok((Links::default(), Some(simulator)))
         }),
         Some(spec) => in_runtime(args, setup, Time::Simulated, |setup| {
-            let links = sim::start_in_process(&spec, setup.plan.rate_hz, seed).map_err(|error| error.to_string())?;
+            let links =
+                simulated::start_in_process(&spec, setup.plan.rate_hz, seed).map_err(|error| error.to_string())?;
             Ok((links, None))
         }),
     }

@@ -8,12 +8,12 @@ use serde_json::{Value, json};
 use super::on_rig::{OnRig, on_rig};
 use super::run::seconds;
 use super::{Exit, fail, print, stop};
-use crate::pair;
 use crate::profile::{Profile, SLOWEST_RPM};
 use crate::run::halt::Halt;
 use crate::run::rig::Rig;
 use crate::run::session::{self, LogHead, Outcome};
 use crate::run::set_up::RATE_HZ;
+use riglog::pair;
 
 /// Options of both.
 #[derive(Debug, clap::Args)]

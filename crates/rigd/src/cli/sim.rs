@@ -7,7 +7,8 @@ use tokio::task::LocalSet;
 use super::{Exit, fail, withhold};
 use crate::profile::Profile;
 use crate::run::stop::StopRequests;
-use crate::{pair, sim};
+use crate::simulated;
+use riglog::pair;
 
 /// Start the simulated rig in real time, on ports of its own.
 #[derive(Debug, clap::Args)]
@@ -51,7 +52,7 @@ pub fn main(args: &Args) -> Exit {
         return withhold::main(&args.withhold, seed, args.pair.as_deref());
     }
     let spec = match pair::load(args.pair.as_deref()) {
-        Ok((_, model)) => sim::spec(&model, &args.undocumented),
+        Ok((_, model)) => simulated::spec(&model, &args.undocumented),
         Err(error) => return fail(Exit::BadInput, &error),
     };
     let spec = match spec {
@@ -76,13 +77,14 @@ pub fn main(args: &Args) -> Exit {
         }
     }
     let readers = args.qsb.then(|| {
-        let output = sim::emulator::QsbClock { offset_s: args.qsb_offset, fast_ppm: args.qsb_drift };
-        [sim::emulator::QsbClock::default(), output]
+        let output = rigsim::emulator::QsbClock { offset_s: args.qsb_offset, fast_ppm: args.qsb_drift };
+        [rigsim::emulator::QsbClock::default(), output]
     });
-    let extras = sim::Extras { record: args.record.clone(), commands: args.commands, readers };
+    let extras = simulated::Extras { record: args.record.clone(), commands: args.commands, readers };
     let outcome = LocalSet::new().block_on(&runtime, async {
-        let stop = StopRequests::listen().map_err(|source| sim::SimError::Io { what: "signals".into(), source })?;
-        sim::serve_ptys(&spec, args.seed, &args.pty_dir, &Profile::simulated(), &extras, stop).await
+        let stop =
+            StopRequests::listen().map_err(|source| simulated::SimError::Io { what: "signals".into(), source })?;
+        simulated::serve_ptys(&spec, args.seed, &args.pty_dir, &Profile::simulated(), &extras, stop).await
     });
     match outcome {
         Ok(()) => Exit::Done,

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use gearmodel::gap::verify::{Verified, VerifiedRow};
+use diagnosis::verify::{Verified, VerifiedRow};
 use serde_json::json;
 
 use super::{Exit, fail, print};
-use crate::gap::Logs;
+use diagnosis::logs::Logs;
 
 /// Compare logs with a model: the residual of every run against the rig's repeatability.
 #[derive(Debug, clap::Args)]

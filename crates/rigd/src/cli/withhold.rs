@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use super::{Exit, fail, print};
-use crate::blind::draw::Baselines;
-use crate::blind::family::Family;
-use crate::blind::set::SetPlan;
-use crate::pair;
+use blindtest::draw::Baselines;
+use blindtest::family::Family;
+use blindtest::set::SetPlan;
+use riglog::pair;
 
 /// Arguments of withheld data.
 #[derive(Debug, clap::Args)]

@@ -5,7 +5,7 @@ use async_trait::async_trait;
 use super::bus::BusStatistics;
 use super::map::{BrakeRules, Map, Mapped};
 use super::stand_in::StandIn;
-use super::{Brake, BrakeStatus, DeviceError, Identity, Part};
+use super::{Brake, BrakeStatus, DeviceError, DeviceKind, Identity};
 use crate::link::{Address, Link};
 use crate::profile::BrakeProfile;
 
@@ -24,7 +24,7 @@ pub fn open(link: Link, address: Address, profile: &BrakeProfile) -> Box<dyn Bra
             let model = map.models.first().cloned();
             Box::new(MappedBrake { device: Mapped { bus, map, model }, rules })
         }
-        Err(reason) => Box::new(StandIn::unmapped(Part::Brake, reason)),
+        Err(reason) => Box::new(StandIn::unmapped(DeviceKind::Brake, reason)),
     }
 }
 

@@ -21,38 +21,7 @@ use wire::counter_box::Samples;
 use crate::link::{Address, Link};
 use crate::profile::{BrakeProfile, CounterProfile, ServoProfile};
 pub use bus::BusError;
-
-/// The three devices of a rig.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Part {
-    /// The servo drive.
-    Servo,
-    /// The brake's driver.
-    Brake,
-    /// The reader of the encoders.
-    Counter,
-}
-
-impl Part {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Servo, Self::Brake, Self::Counter];
-
-    /// As profiles, messages and errors call it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Servo => "servo",
-            Self::Brake => "brake",
-            Self::Counter => "counter",
-        }
-    }
-}
-
-impl std::fmt::Display for Part {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
-    }
-}
+pub use wire::DeviceKind;
 
 /// Who a device says it is.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,7 +5,7 @@ use std::time::Duration;
 use async_trait::async_trait;
 
 use super::bus::BusStatistics;
-use super::{Brake, BrakeStatus, BusError, DeviceError, Identity, Part, Servo, ServoStatus};
+use super::{Brake, BrakeStatus, BusError, DeviceError, DeviceKind, Identity, Servo, ServoStatus};
 
 /// Why there is no driver.
 enum Reason {
@@ -17,7 +17,7 @@ enum Reason {
 
 /// Fails with its device's name and the reason.
 pub struct StandIn {
-    part: Part,
+    part: DeviceKind,
     reason: Reason,
     statistics: BusStatistics,
 }
@@ -25,13 +25,13 @@ pub struct StandIn {
 impl StandIn {
     /// In a lost device's place until it is back; `statistics` say what had happened on its line.
     #[must_use]
-    pub fn lost(part: Part, port: String, statistics: BusStatistics) -> Self {
+    pub fn lost(part: DeviceKind, port: String, statistics: BusStatistics) -> Self {
         Self { part, reason: Reason::Lost { port }, statistics }
     }
 
     /// For a device whose register map is at fault, as `what` says.
     #[must_use]
-    pub fn unmapped(part: Part, what: String) -> Self {
+    pub fn unmapped(part: DeviceKind, what: String) -> Self {
         Self { part, reason: Reason::Unmapped { what }, statistics: BusStatistics::default() }
     }
 
@@ -103,16 +103,16 @@ mod tests {
 
     #[tokio::test]
     async fn whatever_is_asked_is_answered_with_the_reason() {
-        let mut servo = StandIn::unmapped(Part::Servo, "no register 'speed_9'".into());
+        let mut servo = StandIn::unmapped(DeviceKind::Servo, "no register 'speed_9'".into());
         let said = servo.set_motor_rpm(1.0).await.expect_err("refused");
         assert_eq!(lost_part(&said), None, "waiting mends no map");
         let said = said.to_string();
         assert!(said.contains("servo") && said.contains("speed_9"), "{said}");
 
         let line = BusStatistics { timeouts: 3, ..BusStatistics::default() };
-        let mut brake = StandIn::lost(Part::Brake, "/dev/ttyUSB7".into(), line);
+        let mut brake = StandIn::lost(DeviceKind::Brake, "/dev/ttyUSB7".into(), line);
         let said = brake.set_current_a(1.0).await.expect_err("refused");
-        assert_eq!(lost_part(&said), Some(Part::Brake), "it may come back");
+        assert_eq!(lost_part(&said), Some(DeviceKind::Brake), "it may come back");
         assert!(said.to_string().contains("/dev/ttyUSB7"), "{said}");
         assert_eq!((Brake::statistics(&brake).timeouts, brake.max_current_a()), (3, 0.0));
     }

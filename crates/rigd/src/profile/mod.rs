@@ -17,9 +17,6 @@ use lines::Fault;
 /// The embedded profile: emulated hardware in this process.
 pub const SIM_PROFILE: &str = include_str!("sim.toml");
 
-/// The embedded gear pair: the source document's, with its documented errors.
-pub const DEFAULT_PAIR: &str = include_str!("pair.toml");
-
 /// Slower than this nothing is turned, rpm of the driver: a revolution would take hours.
 pub const SLOWEST_RPM: f64 = 0.01;
 

@@ -17,7 +17,7 @@ use super::supervisor::Event;
 /// A run that was begun so often without an end is given up.
 const MOST_ATTEMPTS: u32 = 5;
 
-/// Part of the heat account that has to be free before a run that spent it goes on.
+/// DeviceKind of the heat account that has to be free before a run that spent it goes on.
 const COOLED: f64 = 0.25;
 
 /// Looks on, run by run: a campaign opens a log for each and keeps its journal; a single run needs nothing.

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::supervisor::{Event, State};
-use crate::device::{BusError, DeviceError, Part, UnknownDriver};
+use crate::device::{BusError, DeviceError, DeviceKind, UnknownDriver};
 use crate::link::LinkError;
 
 /// Why a run ends before its time.
@@ -76,7 +76,7 @@ pub enum Halt {
     #[error("{part} did not come back within {patience_s} s: {last}")]
     NotBack {
         /// Which.
-        part: Part,
+        part: DeviceKind,
         /// How long was waited.
         patience_s: f64,
         /// What it said last.
@@ -164,9 +164,9 @@ impl Halt {
             Self::EmergencyStop { .. } => Event::EmergencyStop,
             Self::LeaseExpired { .. } => Event::LeaseExpired,
             _ => match self.lost_part() {
-                Some(Part::Servo) => Event::ServoLost,
-                Some(Part::Brake) => Event::BrakeLost,
-                Some(Part::Counter) => Event::EncodersLost,
+                Some(DeviceKind::Servo) => Event::ServoLost,
+                Some(DeviceKind::Brake) => Event::BrakeLost,
+                Some(DeviceKind::Counter) => Event::EncodersLost,
                 None => Event::Fault,
             },
         }
@@ -174,10 +174,10 @@ impl Halt {
 
     /// The device that does not answer any more, where that is the reason: it may come back.
     #[must_use]
-    pub fn lost_part(&self) -> Option<Part> {
+    pub fn lost_part(&self) -> Option<DeviceKind> {
         match self {
             Self::Device(error) => lost_part(error),
-            Self::EncodersSilent { .. } => Some(Part::Counter),
+            Self::EncodersSilent { .. } => Some(DeviceKind::Counter),
             Self::NotBack { part, .. } => Some(*part),
             _ => None,
         }
@@ -186,12 +186,12 @@ impl Halt {
 
 /// The device that an error says is gone; `None` for one that answers, but not as it should.
 #[must_use]
-pub fn lost_part(error: &DeviceError) -> Option<Part> {
+pub fn lost_part(error: &DeviceError) -> Option<DeviceKind> {
     match error {
         DeviceError::Bus(
             BusError::Silent { device, .. } | BusError::Damaged { device, .. } | BusError::HungUp { device, .. },
-        ) => Part::ALL.into_iter().find(|part| part.name() == *device),
-        DeviceError::Counter { .. } => Some(Part::Counter),
+        ) => DeviceKind::ALL.into_iter().find(|part| part.name() == *device),
+        DeviceError::Counter { .. } => Some(DeviceKind::Counter),
         _ => None,
     }
 }

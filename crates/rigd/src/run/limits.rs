@@ -96,7 +96,7 @@ impl HeatAccount {
         self.heat_j
     }
 
-    /// Part of its room that is taken; above 1 it is spent.
+    /// DeviceKind of its room that is taken; above 1 it is spent.
     #[must_use]
     pub fn fraction(&self, limits: &Limits) -> f64 {
         self.heat_j / (limits.slip_power_w * HEAT_SECONDS)

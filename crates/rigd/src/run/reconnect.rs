@@ -9,7 +9,7 @@ use tokio::time::{Instant, sleep};
 use super::halt::Halt;
 use super::rig::Rig;
 use crate::device::stand_in::StandIn;
-use crate::device::{self, Brake, BusError, Counter, DeviceError, Part, Servo};
+use crate::device::{self, Brake, BusError, Counter, DeviceError, DeviceKind, Servo};
 use crate::link::{Address, Link};
 use crate::profile::Profile;
 
@@ -17,7 +17,7 @@ use crate::profile::Profile;
 const CALL_PERIOD: Duration = Duration::from_millis(250);
 
 /// Opens a device's line another time; `None` while it is out of reach. For emulators within this process.
-pub type Redial = Rc<dyn Fn(Part) -> Option<Link>>;
+pub type Redial = Rc<dyn Fn(DeviceKind) -> Option<Link>>;
 
 /// Knows where the devices are.
 pub struct Dialer {
@@ -32,17 +32,17 @@ impl Dialer {
         Self { profile, redial }
     }
 
-    fn address(&self, part: Part) -> Address {
+    fn address(&self, part: DeviceKind) -> Address {
         let Profile { servo, brake, counter, .. } = &self.profile;
         let (port, baud, format) = match part {
-            Part::Servo => (&servo.port, servo.baud, &servo.format),
-            Part::Brake => (&brake.port, brake.baud, &brake.format),
-            Part::Counter => (&counter.port, counter.baud, &counter.format),
+            DeviceKind::Servo => (&servo.port, servo.baud, &servo.format),
+            DeviceKind::Brake => (&brake.port, brake.baud, &brake.format),
+            DeviceKind::Counter => (&counter.port, counter.baud, &counter.format),
         };
         Address { device: part.name(), port: port.clone(), baud, format: format.clone() }
     }
 
-    async fn link(&self, link: Option<Link>, address: &Address, part: Part) -> Result<Link, Halt> {
+    async fn link(&self, link: Option<Link>, address: &Address, part: DeviceKind) -> Result<Link, Halt> {
         match (link, &self.redial) {
             (Some(link), _) => Ok(link),
             (None, Some(redial)) => redial(part).ok_or_else(|| {
@@ -60,8 +60,8 @@ impl Dialer {
     /// [`Halt::Driver`], [`Halt::Link`].
     pub async fn servo(&self, link: Option<Link>) -> Result<Box<dyn Servo>, Halt> {
         let driver = device::find(device::SERVOS, "servo", &self.profile.servo.driver)?;
-        let address = self.address(Part::Servo);
-        Ok(driver(self.link(link, &address, Part::Servo).await?, address, &self.profile.servo))
+        let address = self.address(DeviceKind::Servo);
+        Ok(driver(self.link(link, &address, DeviceKind::Servo).await?, address, &self.profile.servo))
     }
 
     /// The brake's driver.
@@ -70,8 +70,8 @@ impl Dialer {
     /// As [`Dialer::servo`].
     pub async fn brake(&self, link: Option<Link>) -> Result<Box<dyn Brake>, Halt> {
         let driver = device::find(device::BRAKES, "brake", &self.profile.brake.driver)?;
-        let address = self.address(Part::Brake);
-        Ok(driver(self.link(link, &address, Part::Brake).await?, address, &self.profile.brake))
+        let address = self.address(DeviceKind::Brake);
+        Ok(driver(self.link(link, &address, DeviceKind::Brake).await?, address, &self.profile.brake))
     }
 
     /// The reader of the encoders.
@@ -80,8 +80,8 @@ impl Dialer {
     /// As [`Dialer::servo`].
     pub async fn counter(&self, link: Option<Link>) -> Result<Box<dyn Counter>, Halt> {
         let driver = device::find(device::COUNTERS, "counter", &self.profile.counter.driver)?;
-        let address = self.address(Part::Counter);
-        Ok(driver(self.link(link, &address, Part::Counter).await?, address, &self.profile.counter))
+        let address = self.address(DeviceKind::Counter);
+        Ok(driver(self.link(link, &address, DeviceKind::Counter).await?, address, &self.profile.counter))
     }
 }
 
@@ -104,7 +104,7 @@ impl Rig {
         loop {
             self.heed_stop()?;
             self.log_works()?;
-            for part in Part::ALL.into_iter().filter(|part| self.lost[*part as usize]).collect::<Vec<_>>() {
+            for part in DeviceKind::ALL.into_iter().filter(|part| self.lost[*part as usize]).collect::<Vec<_>>() {
                 if !std::mem::replace(&mut announced[part as usize], true) {
                     self.announce_gap(part, patience_s).await;
                 }
@@ -118,7 +118,7 @@ impl Rig {
                     Err(error) => last = error.to_string(),
                 }
             }
-            let Some(part) = Part::ALL.into_iter().find(|part| self.lost[*part as usize]) else {
+            let Some(part) = DeviceKind::ALL.into_iter().find(|part| self.lost[*part as usize]) else {
                 self.enter(Phase::Idle);
                 return Ok(());
             };
@@ -132,11 +132,11 @@ impl Rig {
 
     /// The devices that still answer go on being asked: one that is lost meanwhile is waited for too.
     pub(super) async fn poll_the_others(&mut self) {
-        if !self.lost[Part::Servo as usize] {
+        if !self.lost[DeviceKind::Servo as usize] {
             let status = self.servo.status().await;
             drop(self.note(status));
         }
-        if !self.lost[Part::Brake as usize] {
+        if !self.lost[DeviceKind::Brake as usize] {
             drop(self.brake_status().await);
         }
         drop(self.encoders_live());
@@ -144,9 +144,9 @@ impl Rig {
         self.acquisition.borrow().write_state();
     }
 
-    async fn announce_gap(&mut self, part: Part, patience_s: f64) {
+    async fn announce_gap(&mut self, part: DeviceKind, patience_s: f64) {
         let now = match part {
-            Part::Counter => {
+            DeviceKind::Counter => {
                 // Its port is closed, and what it said before is no part of what it says next.
                 if let Some(stream) = self.stream.take() {
                     stream.task.abort();
@@ -157,7 +157,7 @@ impl Rig {
                 rig.stream_lost();
                 format!("; no sample after number {}", rig.samples_numbered().saturating_sub(1))
             }
-            Part::Servo | Part::Brake => String::new(),
+            DeviceKind::Servo | DeviceKind::Brake => String::new(),
         };
         let port = self.dialer.address(part).port;
         let what = format!("{part} on {port} is lost{now}; it is called until it answers, up to {patience_s} s");
@@ -165,10 +165,10 @@ impl Rig {
     }
 
     /// Calls a lost device, by the open line while there is one, else by a new one; who it says it is.
-    async fn call(&mut self, part: Part) -> Result<String, Halt> {
+    async fn call(&mut self, part: DeviceKind) -> Result<String, Halt> {
         match part {
-            Part::Servo => self.call_servo_by_name().await,
-            Part::Brake => {
+            DeviceKind::Servo => self.call_servo_by_name().await,
+            DeviceKind::Brake => {
                 let said = self.brake.identify().await;
                 let Err(error) = said else { return Ok(said?.text) };
                 if hung_up(&error) {
@@ -179,7 +179,7 @@ impl Rig {
                 }
                 Err(error.into())
             }
-            Part::Counter => {
+            DeviceKind::Counter => {
                 let mut counter = self.dialer.counter(None).await?;
                 let text = counter.identify().await?.text;
                 self.counter = Some(counter);
@@ -193,7 +193,7 @@ impl Rig {
         let Err(error) = said else { return Ok(said?.text) };
         if hung_up(&error) {
             let (port, statistics) = (self.profile.servo.port.clone(), self.servo.statistics());
-            self.servo = Box::new(StandIn::lost(Part::Servo, port, statistics));
+            self.servo = Box::new(StandIn::lost(DeviceKind::Servo, port, statistics));
             self.servo = self.dialer.servo(None).await?;
             return Ok(self.servo.identify().await?.text);
         }
@@ -204,7 +204,7 @@ impl Rig {
     pub(super) async fn call_servo(&mut self) -> Result<(), Halt> {
         self.call_servo_by_name().await?;
         self.set_speed(None, 0.0).await?;
-        self.lost[Part::Servo as usize] = false;
+        self.lost[DeviceKind::Servo as usize] = false;
         let what = "servo is back while the brake held, and was told to stop".into();
         self.acquisition.borrow().event(Level::Info, "reconnect", what);
         Ok(())

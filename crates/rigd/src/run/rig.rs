@@ -17,7 +17,7 @@ use super::reconnect::Dialer;
 use super::stop::StopRequests;
 use super::supervisor::{Event, State};
 use crate::clock::Clock;
-use crate::device::{Brake, BrakeStatus, Counter, DeviceError, Part, Servo, ServoStatus};
+use crate::device::{Brake, BrakeStatus, Counter, DeviceError, DeviceKind, Servo, ServoStatus};
 use crate::profile::Profile;
 
 pub use super::limits::slip_power_w;
@@ -57,7 +57,7 @@ pub struct Rig {
     pub(super) counter: Option<Box<dyn Counter>>,
     pub(super) stream: Option<Stream>,
     pub(super) dialer: Dialer,
-    /// Devices that do not answer, in the order of [`Part::ALL`].
+    /// Devices that do not answer, in the order of [`DeviceKind::ALL`].
     pub(super) lost: [bool; 3],
     poll: tokio::time::Interval,
     heat_updated: Instant,
@@ -201,7 +201,7 @@ impl Rig {
         Ok(outcome?)
     }
 
-    pub(super) fn lose(&mut self, part: Part) {
+    pub(super) fn lose(&mut self, part: DeviceKind) {
         self.lost[part as usize] = true;
     }
 
@@ -294,7 +294,7 @@ impl Rig {
         let silent_ms = self.clock.now_ns().saturating_sub(arrived_ns) as f64 * 1e-6;
         let limit_ms = self.profile.limits.encoder_silence_ms;
         if arrived_ns > 0 && silent_ms > limit_ms {
-            self.lose(Part::Counter);
+            self.lose(DeviceKind::Counter);
             let port = self.profile.counter.port.clone();
             return Err(Halt::EncodersSilent { port, silent_ms, limit_ms });
         }

@@ -9,7 +9,7 @@ use tokio::time::{Instant, sleep};
 use super::halt::Halt;
 use super::rig::Rig;
 use super::supervisor::{Action, Event, State};
-use crate::device::Part;
+use crate::device::DeviceKind;
 
 /// Slower than this the shafts stand still, rpm of the driver.
 const STANDSTILL_RPM: f64 = 0.02;
@@ -114,7 +114,7 @@ impl Rig {
             Action::ServoOff => match self.servo.set_enabled(false).await {
                 Ok(()) => Some(Event::ServoIsOff),
                 Err(error) => {
-                    if !self.lost[Part::Servo as usize] {
+                    if !self.lost[DeviceKind::Servo as usize] {
                         stop.trouble(self, format!("servo was not switched off: {error}; switch it off by hand"));
                     } else if was_on {
                         stop.trouble(self, "the servo does not answer and may be on: switch the drive off by hand before you touch the rig".into());

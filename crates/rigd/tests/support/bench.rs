@@ -14,9 +14,10 @@ use rigd::run::job::{Job, Kind, RunSpec};
 use rigd::run::recorder::Recorder;
 use rigd::run::session::{self, LogHead, Outcome, Work};
 use rigd::run::stop::StopRequests;
-use rigd::sim::world::World;
-use rigd::{pair, replay, sim};
+use rigd::{replay, simulated};
+use riglog::pair;
 use riglog::{LogReader, Record, RunMetadata};
+use rigsim::world::World;
 use tempfile::TempDir;
 use tokio::task::LocalSet;
 use tokio::time::sleep;
@@ -47,7 +48,7 @@ impl Bench {
     pub fn new(seed: u64) -> Self {
         let rate_hz = 2000.0;
         let (_, model) = pair::load(None).expect("the built-in pair");
-        let spec = sim::spec(&model, &[]).expect("a plant");
+        let spec = simulated::spec(&model, &[]).expect("a plant");
         let mut profile = Profile::simulated();
         let sequence = &mut profile.sequence;
         (sequence.home_rpm, sequence.settle_s, sequence.load_s) = (30.0, 0.4, 0.4);
@@ -85,7 +86,7 @@ impl Bench {
     pub async fn run(&self, job: Job, policy: Policy) -> Outcome {
         let (_, model) = pair::load(None).expect("the built-in pair");
         let work = Work { profile: self.profile.clone(), model, job, policy, quiet: true };
-        let links = sim::links_to(&self.world);
+        let links = simulated::links_to(&self.world);
         session::conduct(work, self.recorder(), &mut Nobody, links, self.clock, self.stop.clone()).await
     }
 

@@ -13,7 +13,6 @@ use super::super::on_rig::{OnRig, on_rig};
 use super::super::{Exit, fail, stop};
 use super::{Output, date};
 use crate::calibration::{BrakeCalibration, Calibration};
-use crate::pair;
 use crate::profile::{Profile, SLOWEST_RPM};
 use crate::quantity::{SPEED, TORQUE};
 use crate::run::Plan;
@@ -22,6 +21,7 @@ use crate::run::halt::Halt;
 use crate::run::limits::slip_power_w;
 use crate::run::rig::Rig;
 use crate::run::session::{self, LogHead, Outcome};
+use riglog::pair;
 
 /// Sampling while the torque is what counts, Hz.
 const RATE_HZ: f64 = 1000.0;

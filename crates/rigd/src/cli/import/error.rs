@@ -6,8 +6,8 @@ use gearmodel::Direction;
 use riglog::LogError;
 use thiserror::Error;
 
-use crate::pair::PairError;
 use crate::quantity::QuantityError;
+use riglog::PairError;
 
 /// Why a table cannot become a log.
 #[derive(Debug, Error)]

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use thiserror::Error;
 use toml::Table;
 
-use crate::pair::{self, PairError};
+use riglog::pair::{self, PairError};
 
 /// Which pair.
 #[derive(Debug, Clone, clap::Args)]

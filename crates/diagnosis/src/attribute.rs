@@ -1,0 +1,122 @@
+//! Posterior over models → probabilities of effects, groups and the unknown.
+
+use nalgebra::DMatrix;
+
+use super::noise::Whitened;
+use super::pool::ZERO;
+use super::pool::{Block, Cause, Pool};
+use super::search::Model;
+use gearmodel::effect::LIBRARY;
+
+/// Subspaces nearer than this cannot be told apart, deg.
+pub const SAME_DEG: f64 = 2.0;
+/// Members of a group may be this much less probable than the best, nats.
+const MEMBER_NATS: f64 = 6.0;
+/// Blocks this much wider than another describe more than it: not a group.
+const MUCH_WIDER: usize = 8;
+
+/// Probabilities from all models seen.
+#[derive(Clone, Debug)]
+pub struct Attribution {
+    /// Posterior inclusion by place in the library.
+    pub probability: Vec<f64>,
+    /// Best block of every effect: of the most probable models that have it, else the one that fits best alone.
+    pub block: Vec<Option<usize>>,
+    /// Probability of any pattern outside the library.
+    pub unknown: f64,
+    /// Weights of the models, best first.
+    pub weights: Vec<f64>,
+}
+
+fn number(block: &Block) -> Option<usize> {
+    match &block.cause {
+        Cause::Effect { number, .. } => Some(*number),
+        Cause::Unknown(_) => None,
+    }
+}
+
+/// Posterior of effects. `sharpness` under 1 flattens what the noise model's own error makes too sure.
+#[must_use]
+pub fn attribute(pool: &Pool, models: &[Model], sharpness: f64) -> Attribution {
+    let best = models.first().map_or(0.0, |m| m.score);
+    let mut weights: Vec<f64> = models.iter().map(|m| (sharpness * (m.score - best)).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    weights.iter_mut().for_each(|w| *w /= total);
+    let mut probability = vec![0.0; LIBRARY.len()];
+    let mut block = vec![None; LIBRARY.len()];
+    let mut unknown = 0.0;
+    for (model, weight) in models.iter().zip(&weights) {
+        let mut outside = false;
+        for b in &model.fit.set {
+            match number(&pool.blocks[*b]) {
+                Some(n) => {
+                    probability[n] += weight;
+                    // Models come best first.
+                    block[n].get_or_insert(*b);
+                }
+                None => outside = true,
+            }
+        }
+        if outside {
+            unknown += weight;
+        }
+    }
+    Attribution { probability, block, unknown, weights }
+}
+
+/// Largest principal angle between two blocks' subspaces, of the smaller one's directions, as the noise weighs them and with
+/// the zero free, deg.
+#[must_use]
+pub fn angle_deg(pool: &Pool, whitened: &Whitened, a: usize, b: usize) -> f64 {
+    let (a, b) = (&pool.blocks[a], &pool.blocks[b]);
+    let g = &whitened.gram;
+    let zero = g[(ZERO, ZERO)];
+    let entry = |m: usize, n: usize| g[(m, n)] - g[(m, ZERO)] * g[(n, ZERO)] / zero;
+    let part = |rows: &std::ops::Range<usize>, columns: &std::ops::Range<usize>| {
+        DMatrix::from_fn(rows.len(), columns.len(), |m, n| entry(rows.start + m, columns.start + n))
+    };
+    let half = |block: &Block| nalgebra::Cholesky::new(part(&block.columns, &block.columns)).map(|c| c.l());
+    let (Some(la), Some(lb)) = (half(a), half(b)) else { return 90.0 };
+    let cross = part(&a.columns, &b.columns);
+    let Some(left) = la.solve_lower_triangular(&cross) else { return 90.0 };
+    let Some(both) = lb.solve_lower_triangular(&left.transpose()) else { return 90.0 };
+    let cosines = both.singular_values();
+    let smallest = cosines.iter().copied().fold(1.0, f64::min);
+    smallest.clamp(0.0, 1.0).acos().to_degrees()
+}
+
+/// Effects that stand under [`SAME_DEG`] from `effect` in this plan and fit the data about as well: their places in the library
+/// with the angle, the effect itself not included.
+#[must_use]
+pub fn twins(
+    pool: &Pool,
+    whitened: &Whitened,
+    attribution: &Attribution,
+    effect: usize,
+    swapped_score: &mut dyn FnMut(usize) -> Option<f64>,
+    best_score: f64,
+) -> Vec<(usize, f64)> {
+    let Some(own) = attribution.block[effect] else { return Vec::new() };
+    let own_width = pool.blocks[own].width();
+    let mut found: Vec<(usize, f64, f64)> = Vec::new();
+    for (b, block) in pool.blocks.iter().enumerate() {
+        let Some(n) = number(block) else { continue };
+        if n == effect || block.width() * MUCH_WIDER < own_width || own_width * MUCH_WIDER < block.width() {
+            continue;
+        }
+        let angle = angle_deg(pool, whitened, own, b);
+        if angle >= SAME_DEG {
+            continue;
+        }
+        let Some(score) = swapped_score(b) else { continue };
+        if score < best_score - MEMBER_NATS {
+            continue;
+        }
+        match found.iter_mut().find(|(m, ..)| *m == n) {
+            Some(known) if known.2 < score => *known = (n, angle, score),
+            Some(_) => {}
+            None => found.push((n, angle, score)),
+        }
+    }
+    found.into_iter().map(|(n, angle, _)| (n, angle)).collect()
+}

@@ -1,0 +1,352 @@
+//! Points → revolutions × angle bins, with a station for every bin.
+//!
+//! A revolution begins where its run begins, so that n full turns are n revolutions wherever they start. Columns that are
+//! the same in every revolution of a run are evaluated once a run and bin (a *cell*); columns that evolve, at every bin of
+//! every revolution (a *place*).
+
+use std::f64::consts::TAU;
+
+use super::reduce::{Point, ReducedRun};
+use gearmodel::Direction;
+use gearmodel::effect::{Ledger, Plan, Rig, Station};
+
+/// Bins a turn where there are few revolutions.
+const MOST_BINS: usize = 720;
+/// Most revolutions held apart; beyond, neighbours in a run are averaged.
+const MOST_REVOLUTIONS: usize = 64;
+/// Most places in all.
+const MOST_PLACES: usize = 60_000;
+
+/// A revolution, or the mean of neighbouring ones.
+#[derive(Clone, Debug)]
+pub struct Revolution {
+    /// Run.
+    pub run: usize,
+    /// Its places.
+    pub places: std::ops::Range<usize>,
+    /// Share of the turn that is covered.
+    pub coverage: f64,
+}
+
+/// Residual by revolution and angle.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    /// Revolutions, run after run.
+    pub revolutions: Vec<Revolution>,
+    /// Runs' senses.
+    pub directions: Vec<Direction>,
+    /// Station of every place.
+    pub places: Vec<Station>,
+    /// Cell of every place.
+    pub cell_of: Vec<usize>,
+    /// Station of every cell.
+    pub cells: Vec<Station>,
+    /// Part of its revolution at which every cell stands, 0 to 1.
+    pub part_of_cell: Vec<f64>,
+    /// Residual at every place, rad.
+    pub rho_rad: Vec<f64>,
+    /// Samples at every place.
+    pub weight: Vec<f64>,
+    /// Place of every point, run after run.
+    pub place_of_point: Vec<Vec<usize>>,
+    /// What the recordings cover.
+    pub plan: Plan,
+    /// Bins a turn.
+    pub bins: usize,
+    /// Squared deviations of the samples from their place's mean, rad².
+    pub within_rad2: f64,
+    /// Samples in all.
+    pub samples: f64,
+}
+
+/// Sums of a place.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    weight: f64,
+    time: f64,
+    theta1: f64,
+    theta2: f64,
+    rho: f64,
+    rho2: f64,
+    load: f64,
+    way: f64,
+    /// Driver's way from the bin's middle, and its square over the samples.
+    off: f64,
+    off2: f64,
+}
+
+impl Sum {
+    /// Mean way of the samples from the bin's middle, rad, and its variance, rad².
+    fn spread(&self) -> (f64, f64) {
+        let mean = self.off / self.weight;
+        (mean, (self.off2 / self.weight - mean * mean).max(0.0))
+    }
+
+    fn add_spread(&mut self, weight: f64, off: f64, variance: f64) {
+        self.weight += weight;
+        self.off += weight * off;
+        self.off2 += weight * (off * off + variance);
+    }
+}
+
+impl Grid {
+    /// Bins the runs' points.
+    #[must_use]
+    pub fn new(rig: &Rig, runs: &[ReducedRun]) -> Self {
+        let way_of = |run: &ReducedRun, point: &Point| (point.theta1_rad - run.points[0].theta1_rad).abs() / TAU;
+        let turns: Vec<usize> = runs
+            .iter()
+            .map(|run| run.points.last().map_or(0, |last| (way_of(run, last) - 1e-3).max(0.0) as usize + 1))
+            .collect();
+        let total: usize = turns.iter().sum();
+        // Revolutions may be averaged only where the driven gear closes with them.
+        let closes = (rig.pair().closure() - rig.pair().closure().round()).abs() < 1e-9;
+        let merge = if closes { total.div_ceil(MOST_REVOLUTIONS).max(1) } else { 1 };
+        let merged: usize = turns.iter().map(|n| n.div_ceil(merge)).sum();
+        let bins = (MOST_PLACES / merged.max(1)).clamp(24, MOST_BINS);
+
+        let start_s = runs.iter().filter_map(|run| run.points.first()).map(|p| p.time_s).fold(f64::INFINITY, f64::min);
+        let loads_nm = levels(runs.iter().flat_map(|run| run.points.iter().map(|p| p.load_nm)));
+        let mut ledger = Ledger::default();
+        for (slot, load) in ledger.load_nm.iter_mut().zip(&loads_nm) {
+            *slot = *load;
+        }
+        let mut order: Vec<usize> = (0..runs.len()).filter(|n| !runs[*n].points.is_empty()).collect();
+        order.sort_by(|a, b| runs[*a].points[0].time_s.total_cmp(&runs[*b].points[0].time_s));
+
+        let mut grid = Self {
+            revolutions: Vec::new(),
+            directions: Vec::new(),
+            places: Vec::new(),
+            cell_of: Vec::new(),
+            cells: Vec::new(),
+            part_of_cell: Vec::new(),
+            rho_rad: Vec::new(),
+            weight: Vec::new(),
+            place_of_point: vec![Vec::new(); runs.len()],
+            plan: Plan::default(),
+            bins,
+            within_rad2: runs.iter().map(|run| run.within_rad2).sum(),
+            samples: runs.iter().map(|run| run.samples).sum(),
+        };
+        let mut speeds = Vec::new();
+        let mut end_s = start_s;
+        for n in order {
+            let run = &runs[n];
+            let (first, last) = (run.points[0], run.points[run.points.len() - 1]);
+            end_s = end_s.max(last.time_s);
+            let mean_speed = (last.theta1_rad - first.theta1_rad) / (last.time_s - first.time_s).max(1e-9);
+            let nominal = run.direction.sign() * run.speed_rpm * TAU / 60.0;
+            let speed = if run.speed_rpm > 0.0 { nominal } else { mean_speed };
+            speeds.push(speed.abs());
+            grid.plan.starts_s.push(first.time_s - start_s);
+            grid.plan.senses[usize::from(run.direction == Direction::Cw)] = true;
+            grid.plan.revolutions += way_of(run, &last);
+            grid.add_run(rig, run, n, &RunFrame { turns: turns[n], merge, closes, start_s, mean_speed }, &mut ledger);
+        }
+        grid.plan.runs = grid.directions.len();
+        grid.plan.loads_nm = loads_nm;
+        grid.plan.speeds_rad_per_s = levels(speeds.into_iter());
+        grid.plan.duration_s = end_s - start_s;
+        grid.plan.turns =
+            [|at: &Station| at.theta1_rad, |at: &Station| at.theta2_rad].map(|angle: fn(&Station) -> f64| {
+                let (low, high) = grid
+                    .places
+                    .iter()
+                    .map(angle)
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+                ((high - low) / TAU).clamp(0.0, 1.0)
+            });
+        grid
+    }
+
+    /// Turns between the least and the largest angle of the driver.
+    #[must_use]
+    pub fn span_rev(&self) -> f64 {
+        let (low, high) = self
+            .places
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), at| (l.min(at.theta1_rad), h.max(at.theta1_rad)));
+        (high - low) / TAU
+    }
+
+    fn add_run(&mut self, rig: &Rig, run: &ReducedRun, number: usize, frame: &RunFrame, ledger: &mut Ledger) {
+        let index = self.directions.len();
+        self.directions.push(run.direction);
+        let bins = self.bins;
+        let revolutions = frame.turns.div_ceil(frame.merge).max(1);
+        let mut sums = vec![Sum::default(); revolutions * bins];
+        let origin_rad = run.points[0].theta1_rad;
+        let speeds = local_speeds(&run.points, frame.mean_speed);
+        let mut books = vec![Ledger::default(); revolutions * bins];
+        let mut speed_sums = vec![0.0; revolutions * bins];
+        let mut keys = Vec::with_capacity(run.points.len());
+        let mut before = origin_rad;
+        for (point, speed) in run.points.iter().zip(&speeds) {
+            let step_rev = (point.theta1_rad - before) / TAU;
+            before = point.theta1_rad;
+            let slot = nearest(&ledger.load_nm, point.load_nm);
+            ledger.signed_rev[slot] += step_rev;
+            ledger.way_rev[slot] += step_rev.abs();
+            // Bins count from where the run begins, so that none holds both ends of a revolution.
+            let way_rev = (point.theta1_rad - origin_rad).abs() / TAU;
+            let turn = (way_rev as usize).min(frame.turns - 1);
+            let bin = (((way_rev - turn as f64).clamp(0.0, 1.0) * bins as f64) as usize).min(bins - 1);
+            let turn_rev = turn as f64;
+            let turn = turn / frame.merge;
+            let key = turn * bins + bin;
+            keys.push(key);
+            let w = point.samples;
+            // Means of the first turn's angles stand for all turns of a merged revolution.
+            let turns_away = ((point.theta1_rad - origin_rad) / TAU).trunc() * f64::from(u8::from(frame.merge > 1));
+            let sum = &mut sums[key];
+            let middle_rev = turn_rev + (bin as f64 + 0.5) / bins as f64;
+            sum.add_spread(w, (way_rev - middle_rev) * TAU, point.spread_rad2);
+            sum.time += w * (point.time_s - frame.start_s);
+            sum.theta1 += w * (point.theta1_rad - TAU * turns_away);
+            sum.theta2 += w * (point.theta2_rad - TAU * turns_away * rig.pair().closure());
+            sum.rho += w * point.rho_rad;
+            sum.rho2 += w * point.rho_rad * point.rho_rad;
+            sum.load += w * point.load_nm;
+            sum.way += w * ledger.way_rev.iter().sum::<f64>();
+            speed_sums[key] += w * speed;
+            for slot in 0..ledger.load_nm.len() {
+                books[key].signed_rev[slot] += w * ledger.signed_rev[slot];
+                books[key].way_rev[slot] += w * ledger.way_rev[slot];
+            }
+        }
+        let steady = frame.closes && steady_load(&run.points);
+        let mut place_of_key = vec![usize::MAX; sums.len()];
+        let mut cell_of_bin = vec![usize::MAX; bins];
+        let first_cell = self.cells.len();
+        // Way of a cell's first station from the bin's middle, and the ways of all of its places.
+        let mut cell_sums: Vec<(f64, Sum)> = Vec::new();
+        for revolution in 0..revolutions {
+            let first = self.places.len();
+            for (bin, cell) in cell_of_bin.iter_mut().enumerate() {
+                let key = revolution * bins + bin;
+                let sum = sums[key];
+                if sum.weight == 0.0 {
+                    continue;
+                }
+                let w = sum.weight;
+                let mut station = rig.station(sum.theta1 / w, sum.theta2 / w, run.direction);
+                station.load_nm = sum.load / w;
+                station.time_s = sum.time / w;
+                station.way_rev = sum.way / w;
+                station.speed_rad_per_s = speed_sums[key] / w;
+                station.run = index;
+                let (off_rad, variance_rad2) = sum.spread();
+                station.spread_rad = variance_rad2.sqrt();
+                station.ledger = Ledger {
+                    load_nm: ledger.load_nm,
+                    signed_rev: books[key].signed_rev.map(|x| x / w),
+                    way_rev: books[key].way_rev.map(|x| x / w),
+                };
+                if !steady || *cell == usize::MAX {
+                    *cell = self.cells.len();
+                    self.cells.push(station);
+                    self.part_of_cell.push((bin as f64 + 0.5) / bins as f64);
+                    cell_sums.push((off_rad, Sum::default()));
+                }
+                cell_sums[*cell - first_cell].1.add_spread(w, off_rad, variance_rad2);
+                place_of_key[key] = self.places.len();
+                self.places.push(station);
+                self.cell_of.push(*cell);
+                self.rho_rad.push(sum.rho / w);
+                self.weight.push(w);
+                self.within_rad2 += (sum.rho2 - sum.rho * sum.rho / w).max(0.0);
+            }
+            let places = first..self.places.len();
+            if !places.is_empty() {
+                let coverage = places.len() as f64 / bins as f64;
+                self.revolutions.push(Revolution { run: index, places, coverage });
+            }
+        }
+        // A cell stands for its places of all revolutions: where their samples lie in the mean, and as far about it as they do.
+        for (cell, (first_rad, sum)) in self.cells[first_cell..].iter_mut().zip(cell_sums) {
+            let (mean_rad, variance_rad2) = sum.spread();
+            let step_rad = run.direction.sign() * (mean_rad - first_rad);
+            let (theta1_rad, theta2_rad) = (cell.theta1_rad + step_rad, cell.theta2_rad + cell.ratio * step_rad);
+            cell.take_angles_of(&rig.station(theta1_rad, theta2_rad, run.direction));
+            cell.spread_rad = variance_rad2.sqrt();
+        }
+        self.place_of_point[number] = keys.into_iter().map(|key| place_of_key[key]).collect();
+    }
+}
+
+/// What a run's binning needs beside its points.
+struct RunFrame {
+    turns: usize,
+    merge: usize,
+    closes: bool,
+    start_s: f64,
+    mean_speed: f64,
+}
+
+/// Distinct values, at most as many as a ledger holds; nearer than 2 % of the largest count as one.
+fn levels(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    let mut sorted: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let reach = sorted.iter().fold(0.0_f64, |m, v| m.max(v.abs())) * 0.02;
+    for value in sorted {
+        match found.last_mut() {
+            Some((mean, count)) if value - *mean <= reach => {
+                *mean += (value - *mean) / (*count + 1.0);
+                *count += 1.0;
+            }
+            _ => found.push((value, 1.0)),
+        }
+    }
+    // More levels than a ledger has: the nearest neighbours become one.
+    while found.len() > gearmodel::effect::LEDGER_LOADS {
+        let Some(at) =
+            (1..found.len()).min_by(|a, b| (found[*a].0 - found[*a - 1].0).total_cmp(&(found[*b].0 - found[*b - 1].0)))
+        else {
+            break;
+        };
+        let (value, count) = found.remove(at);
+        let (mean, had) = found[at - 1];
+        found[at - 1] = ((mean * had + value * count) / (had + count), had + count);
+    }
+    found.into_iter().map(|(mean, _)| mean).collect()
+}
+
+/// Place of the level nearest to a value; 0 where there is none.
+pub(super) fn nearest(levels: &[f64], value: f64) -> usize {
+    (0..levels.len()).min_by(|a, b| (levels[*a] - value).abs().total_cmp(&(levels[*b] - value).abs())).unwrap_or(0)
+}
+
+/// Whether a run keeps its load within 2 % of its largest.
+fn steady_load(points: &[Point]) -> bool {
+    let (low, high) = points
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.load_nm), high.max(p.load_nm)));
+    high - low <= 0.02 * high.abs().max(low.abs()).max(1e-9)
+}
+
+/// Speed at every point over a hundredth of a turn about it, rad/s.
+fn local_speeds(points: &[Point], mean: f64) -> Vec<f64> {
+    let half = TAU / 100.0;
+    let (mut low, mut high) = (0, 0);
+    points
+        .iter()
+        .map(|point| {
+            while (points[low].theta1_rad - point.theta1_rad).abs() > half && low + 1 < points.len() {
+                low += 1;
+            }
+            while high + 1 < points.len() && (points[high].theta1_rad - point.theta1_rad).abs() < half {
+                high += 1;
+            }
+            let span_s = points[high].time_s - points[low].time_s;
+            let speed = (points[high].theta1_rad - points[low].theta1_rad) / span_s;
+            // A pause or a gap inside the stretch says nothing about the speed.
+            if span_s > 0.0 && speed.is_finite() && speed * mean > 0.0 && (speed / mean - 1.0).abs() < 0.5 {
+                speed
+            } else {
+                mean
+            }
+        })
+        .collect()
+}
