@@ -1,7 +1,7 @@
 //! What differs from case to case and is no fault: noise, scatter between revolutions and runs, sampling, discs, stiffness.
 
 use rigsim::plant::PlantSpec;
-use rigsim::plant::undocumented::Dice;
+use rigsim::plant::undocumented::FaultRng;
 
 /// Mean driven radius, over which a displacement along the pitch line turns the gear, mm.
 const RADIUS_MM: f64 = 72.5;
@@ -36,28 +36,33 @@ pub struct Conditions {
 impl Conditions {
     /// Draws them: floors of 8 to 25 µrad a sample. `interpolation_rad` and `stiffness_rad` are the sizes of such effects in the case;
     /// lines must be wide enough for the one, documented teeth soft enough for the other.
-    pub fn draw(dice: &mut Dice, documented: f64, interpolation_rad: Option<f64>, stiffness_rad: Option<f64>) -> Self {
-        let floor_rad = dice.spread(8e-6, 25e-6);
-        let run_out_rad = floor_rad * dice.spread(0.03, 0.25);
-        let slow_run_out_rad = run_out_rad * dice.spread(0.1, 0.6);
+    pub fn draw(
+        rng: &mut FaultRng,
+        documented: f64,
+        interpolation_rad: Option<f64>,
+        stiffness_rad: Option<f64>,
+    ) -> Self {
+        let floor_rad = rng.spread(8e-6, 25e-6);
+        let run_out_rad = floor_rad * rng.spread(0.03, 0.25);
+        let slow_run_out_rad = run_out_rad * rng.spread(0.1, 0.6);
         let white_rad = (floor_rad.powi(2) - run_out_rad.powi(2) - slow_run_out_rad.powi(2)).sqrt();
         let usable: Vec<u32> = LINES
             .into_iter()
             .filter(|lines| interpolation_rad.is_none_or(|rms| 2f64.sqrt() * rms * f64::from(*lines) < LARGEST_OFFSET))
             .collect();
-        let lines = usable.get(dice.below(usable.len())).copied().unwrap_or(2_500);
+        let lines = usable.get(rng.below(usable.len())).copied().unwrap_or(2_500);
         // Some rigs have soft gears, and their drawing says so.
-        let soft = if dice.between(0.0, 1.0) < 0.2 { dice.spread(1.0, 20.0) } else { 1.0 };
+        let soft = if rng.between(0.0, 1.0) < 0.2 { rng.spread(1.0, 20.0) } else { 1.0 };
         let needed = stiffness_rad.map_or(0.0, |rms| 800.0 * rms);
         Self {
-            rate_hz: [500.0, 1000.0, 2000.0][dice.below(3)],
+            rate_hz: [500.0, 1000.0, 2000.0][rng.below(3)],
             white_rad,
             run_out_rad,
-            run_out_rev: dice.spread(0.15, 0.8),
+            run_out_rev: rng.spread(0.15, 0.8),
             slow_run_out_rad,
             lines,
             mesh_compliance_mm2_rad_per_nm: (documented * soft).max(needed),
-            seed: dice.seed(),
+            seed: rng.seed(),
         }
     }
 
@@ -82,9 +87,9 @@ mod tests {
 
     #[test]
     fn floors_stay_in_their_range_and_discs_count_alike() {
-        let mut dice = Dice::new(2);
+        let mut rng = FaultRng::new(2);
         for _ in 0..500 {
-            let drawn = Conditions::draw(&mut dice, 1.7e-3, Some(3e-5), Some(3e-5));
+            let drawn = Conditions::draw(&mut rng, 1.7e-3, Some(3e-5), Some(3e-5));
             let floor = (drawn.white_rad.powi(2) + drawn.run_out_rad.powi(2) + drawn.slow_run_out_rad.powi(2)).sqrt();
             assert!((8e-6..=25.001e-6).contains(&floor), "{floor}");
             assert!(drawn.mesh_compliance_mm2_rad_per_nm >= 0.024);

@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use rigsim::plant::undocumented::{Dice, OUTSIDE, UNDOCUMENTED};
+use rigsim::plant::undocumented::{FaultRng, OUTSIDE, UNDOCUMENTED};
 
 /// Sizes at which single effects are drawn, rad RMS.
 pub const SINGLE_SIZES_RAD: [f64; 4] = [3e-6, 1e-5, 3e-5, 1e-4];
@@ -77,9 +77,9 @@ pub fn of_case(number: usize, only: Option<Family>) -> (Family, usize) {
 fn order() -> Vec<Family> {
     let mut order: Vec<Family> =
         Family::shares().into_iter().flat_map(|(family, count)| std::iter::repeat_n(family, count)).collect();
-    let mut dice = Dice::new(1);
+    let mut rng = FaultRng::new(1);
     for n in (1..order.len()).rev() {
-        order.swap(n, dice.below(n + 1));
+        order.swap(n, rng.below(n + 1));
     }
     order
 }

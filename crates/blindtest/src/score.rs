@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::calibration::Calibration;
+use super::case_score::{Outcome, Truth};
 use super::family::{Family, SINGLE_SIZES_RAD};
-use super::verdict::{Outcome, Truth};
 
 /// Edges of the power curve, standard errors.
 const POWER_EDGES: [f64; 8] = [0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0];
@@ -305,8 +305,8 @@ fn coverage(outcomes: &[Outcome]) -> BTreeMap<String, Rate> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::verdict::judge;
-    use crate::verdict::tests::{answer, label};
+    use crate::case_score::judge;
+    use crate::case_score::tests::{answer, label};
     use serde_json::json;
 
     /// A small set with a hit, a miss, a false name and an unknown.

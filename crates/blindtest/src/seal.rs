@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::BlindError;
-use super::draw::Label;
+use super::generate::Label;
 
 /// Directory of the labels beside the logs.
 const DIRECTORY: &str = "sealed";

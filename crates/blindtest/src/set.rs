@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::draw::{self, Baselines};
 use super::family::{Family, of_case};
+use super::generate::{self, Baselines};
 use super::seal::Sealed;
 use super::{BlindError, log};
 
@@ -25,7 +25,7 @@ impl SetPlan {
     /// # Errors
     /// [`BlindError`] for a case that cannot be drawn or written.
     pub fn make(&self, directory: &Path, number: usize) -> Result<PathBuf, BlindError> {
-        let case = draw::make(self.seed, number, of_case(number, self.family), &self.pair_toml, &self.baselines)?;
+        let case = generate::make(self.seed, number, of_case(number, self.family), &self.pair_toml, &self.baselines)?;
         let sealed = Sealed::new(&case.label);
         let path = log::path(directory, number);
         log::write(&path, &case.campaign, &case.pair_toml, &sealed.hash())?;

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::nominal::{Nominal, carried_by_line};
 use super::reduce::ReducedRun;
-use gearmodel::effect::{LEDGER_LOADS, Ledger, Station, Term};
+use gearmodel::effect::{MOST_LOADS, OperatingPoint, RevolutionsByLoad, Term};
 
 impl Nominal {
     /// Takes the documented effects off runs that are in order of time and share one clock: what slipped, wore or warmed in
@@ -14,20 +14,20 @@ impl Nominal {
         let Some(rig) = effects.rig() else { return };
         let terms: Vec<&Term> = effects.terms().iter().filter(|term| !carried_by_line(term)).collect();
         let start_s = runs.iter().filter_map(|run| run.points.first()).map(|p| p.time_s).fold(f64::INFINITY, f64::min);
-        let mut ledger = Book::default();
+        let mut revolutions_by_load = Book::default();
         for run in runs {
             let speeds = speeds_rad_per_s(run);
             let mut before_rad = run.points.first().map_or(0.0, |point| point.theta1_rad);
             for (point, speed_rad_per_s) in run.points.iter_mut().zip(speeds) {
-                ledger.turn(point.load_nm, (point.theta1_rad - before_rad) / TAU);
+                revolutions_by_load.turn(point.load_nm, (point.theta1_rad - before_rad) / TAU);
                 before_rad = point.theta1_rad;
-                let station = Station {
+                let station = OperatingPoint {
                     load_nm: point.load_nm,
                     speed_rad_per_s,
                     time_s: point.time_s - start_s,
-                    way_rev: ledger.book.way_rev.iter().sum(),
-                    ledger: ledger.book,
-                    ..rig.station(point.theta1_rad, point.theta2_rad, run.direction)
+                    way_rev: revolutions_by_load.book.way_rev.iter().sum(),
+                    revolutions_by_load: revolutions_by_load.book,
+                    ..rig.operating_point(point.theta1_rad, point.theta2_rad, run.direction)
                 };
                 point.rho_rad -= terms.iter().map(|term| term.te_rad(rig, &station)).sum::<f64>();
             }
@@ -38,7 +38,7 @@ impl Nominal {
 /// Revolutions by load.
 #[derive(Default)]
 struct Book {
-    book: Ledger,
+    book: RevolutionsByLoad,
     loads: usize,
 }
 
@@ -48,7 +48,7 @@ impl Book {
         let nearest =
             (0..self.loads).min_by(|a, b| (known[*a] - load_nm).abs().total_cmp(&(known[*b] - load_nm).abs()));
         let slot = match nearest {
-            Some(slot) if (known[slot] - load_nm).abs() <= 0.02 * load_nm.abs() || self.loads == LEDGER_LOADS => slot,
+            Some(slot) if (known[slot] - load_nm).abs() <= 0.02 * load_nm.abs() || self.loads == MOST_LOADS => slot,
             _ => {
                 self.book.load_nm[self.loads] = load_nm;
                 self.loads += 1;

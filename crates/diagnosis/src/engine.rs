@@ -2,19 +2,22 @@
 
 use rayon::prelude::*;
 
-use super::attribute::{self, Attribution, twins};
+use super::design_matrix::{Candidate, DesignMatrix};
 use super::diagnosis::{Confusability, Diagnosis, EffectFinding, Group, Unknown, UnknownLocation, Verdict};
 use super::events::Tone;
 use super::grid::Grid;
-use super::knocks::Knocks;
 use super::line_phase::{LineError, LinePhase};
 use super::noise::{FIRST_RUN_RATIO, Noise, Whitened};
 use super::nominal::Nominal;
-use super::pool::{Cause, Pool};
+use super::nuisance_patterns::Pattern;
+use super::posterior::{self, Posterior, confusable};
 use super::reduce::{ReducedRun, Reducer, Sample};
 use super::search::{Allowed, Model, Search};
-use super::unknown::Pattern;
-use super::{events, evidence, ghosts, interpolation, knocks, locate, next, sectors, shrink, slow_tone};
+use super::transients::Knocks;
+use super::{
+    cross_validation, events, evidence, experiment_design, ghosts, interpolation, localisation, sectors, slow_tone,
+    transients,
+};
 use gearmodel::effect::predict::{Found, FoundEffect};
 use gearmodel::effect::{Accumulates, Carrier, Effect, Estimate, INTERPOLATION, LIBRARY, Rig, by_name};
 use gearmodel::recording::Recording;
@@ -55,9 +58,9 @@ pub enum GapError {
     /// No recording at all.
     #[error("no recording was given: at least 1 is needed")]
     NoRecording,
-    /// Recordings without a stretch in which the driver turns.
+    /// Recordings without a segment in which the driver turns.
     #[error(
-        "{recordings} recordings hold {points} stretches of motion together: at least {needed} are needed (a quarter degree each)"
+        "{recordings} recordings hold {points} segments of motion together: at least {needed} are needed (a quarter degree each)"
     )]
     TooShort {
         /// Recordings given.
@@ -186,7 +189,7 @@ pub fn diagnose_runs(
     }
     let found_lines = take_off_lines(&mut runs, lines.as_ref(), options);
     let mut grid = Grid::new(nominal.rig(), &runs);
-    let knocks = knocks::take_off(&grid, &mut runs);
+    let knocks = transients::take_off(&grid, &mut runs);
     if knocks.is_some() {
         grid = Grid::new(nominal.rig(), &runs);
     }
@@ -221,7 +224,7 @@ fn take_off_lines(runs: &mut [ReducedRun], lines: Option<&LinePhase>, options: &
     let within_rad2: f64 = runs.iter().map(|run| run.within_rad2).sum();
     let samples: f64 = runs.iter().map(|run| run.samples).sum();
     let points: usize = runs.iter().map(|run| run.points.len()).sum();
-    // That part of the samples' scatter which lies inside the stretches goes there.
+    // That part of the samples' scatter which lies inside the segments goes there.
     let inside = if samples > 0.0 { 1.0 - points as f64 / samples } else { 0.0 };
     for run in runs {
         for point in &mut run.points {
@@ -294,7 +297,7 @@ struct Engine<'a> {
     rig: &'a Rig,
     aside: Aside,
     grid: Grid,
-    pool: Pool,
+    pool: DesignMatrix,
     options: &'a Options,
     noise: Noise,
     whitened: Whitened,
@@ -306,7 +309,7 @@ struct Engine<'a> {
 
 impl<'a> Engine<'a> {
     fn new(rig: &'a Rig, grid: Grid, aside: Aside, options: &'a Options) -> Self {
-        let mut pool = Pool::new(&grid);
+        let mut pool = DesignMatrix::new(&grid);
         let mut causes = Vec::new();
         for (number, effect) in LIBRARY.iter().copied().enumerate() {
             if !effect.applies(rig) || options.exclude.iter().any(|name| name == effect.name()) {
@@ -315,13 +318,13 @@ impl<'a> Engine<'a> {
             let shapes = effect.shapes(rig, &grid.plan);
             // Neighbouring shapes are alike: they count as fewer.
             let cost_nats = 0.8 * (shapes.len().max(1) as f64).ln();
-            causes.extend(shapes.into_iter().map(|shape| Cause::Effect { effect, number, shape, cost_nats }));
+            causes.extend(shapes.into_iter().map(|shape| Candidate::Effect { effect, number, shape, cost_nats }));
         }
-        causes.extend(Pattern::all(&grid.plan).into_iter().map(Cause::Unknown));
+        causes.extend(Pattern::all(&grid.plan).into_iter().map(Candidate::Unknown));
         pool.add(&grid, rig, &causes);
         let noise = Noise::estimate(&grid, &pool, &[]);
         let ghosts = ghosts::find(&grid, &noise, &grid.rho_rad);
-        pool.add(&grid, rig, &ghosts.into_iter().map(Cause::Unknown).collect::<Vec<_>>());
+        pool.add(&grid, rig, &ghosts.into_iter().map(Candidate::Unknown).collect::<Vec<_>>());
         let whitened = Whitened::empty();
         Self { rig, aside, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None }
     }
@@ -379,16 +382,16 @@ impl<'a> Engine<'a> {
     }
 
     /// A search in a pool under one noise, with what is known and what was cut out.
-    fn search_in<'b>(&self, pool: &'b Pool, whitened: &'b Whitened) -> Search<'b> {
+    fn search_in<'b>(&self, pool: &'b DesignMatrix, whitened: &'b Whitened) -> Search<'b> {
         Search::new(pool, whitened, &self.options.known, self.aside.least_rad())
     }
 
     /// The scatter between runs that a fit leaves, weighed on a grid.
-    fn best_run_ratio(&self, noise: &Noise, pool: &Pool, fit: &evidence::Fit) -> [f64; 2] {
+    fn best_run_ratio(&self, noise: &Noise, pool: &DesignMatrix, fit: &evidence::Fit) -> [f64; 2] {
         if self.grid.plan.runs < 2 {
             return noise.run_ratio;
         }
-        let mut columns = vec![super::pool::RESIDUAL];
+        let mut columns = vec![super::design_matrix::RESIDUAL];
         columns.extend(&fit.columns);
         let mut chosen = (f64::NEG_INFINITY, noise.run_ratio);
         let within = noise.within_runs(&self.grid, pool, Some(&columns));
@@ -433,9 +436,9 @@ impl<'a> Engine<'a> {
             }
         }
         if changed {
-            let shaped: Vec<Cause> = few.blocks.into_iter().map(|block| block.cause).collect();
+            let shaped: Vec<Candidate> = few.blocks.into_iter().map(|block| block.cause).collect();
             let known: Vec<Option<usize>> = shaped.iter().map(|cause| self.block_of(cause)).collect();
-            let fresh: Vec<Cause> =
+            let fresh: Vec<Candidate> =
                 shaped.into_iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(cause, _)| cause).collect();
             let mut added = self.pool.add(&self.grid, self.rig, &fresh).into_iter();
             self.large = Some(known.into_iter().filter_map(|k| k.or_else(|| added.next())).collect());
@@ -444,28 +447,30 @@ impl<'a> Engine<'a> {
     }
 
     /// Block of the pool with the same cause.
-    fn block_of(&self, cause: &Cause) -> Option<usize> {
+    fn block_of(&self, cause: &Candidate) -> Option<usize> {
         self.pool.blocks.iter().position(|block| match (&block.cause, cause) {
-            (Cause::Unknown(a), Cause::Unknown(b)) => a == b,
-            (Cause::Effect { number: m, shape: a, .. }, Cause::Effect { number: n, shape: b, .. }) => m == n && a == b,
+            (Candidate::Unknown(a), Candidate::Unknown(b)) => a == b,
+            (Candidate::Effect { number: m, shape: a, .. }, Candidate::Effect { number: n, shape: b, .. }) => {
+                m == n && a == b
+            }
             _ => false,
         })
     }
 
     /// Tries the shapes about that of a pool's first block, and puts the best behind the others; true where that is another.
-    fn sharpen_first(&self, few: &mut Pool, step: f64) -> bool {
+    fn sharpen_first(&self, few: &mut DesignMatrix, step: f64) -> bool {
         let all: Vec<usize> = (0..few.blocks.len()).collect();
         let whitened = self.noise.whiten(&self.grid, few);
         let Some(now) = evidence::fit(few, &whitened, &all, &[]) else { return false };
-        let fresh: Vec<Cause> = match few.blocks[0].cause.clone() {
-            Cause::Effect { effect, number, shape, cost_nats } => {
+        let fresh: Vec<Candidate> = match few.blocks[0].cause.clone() {
+            Candidate::Effect { effect, number, shape, cost_nats } => {
                 let refined = effect.refine(self.rig, &shape, &amplitudes_of(few, &whitened, &now, 0).beta);
                 let shapes = effect.neighbours(&shape, step).into_iter().chain(refined);
-                shapes.map(|shape| Cause::Effect { effect, number, shape, cost_nats }).collect()
+                shapes.map(|shape| Candidate::Effect { effect, number, shape, cost_nats }).collect()
             }
-            Cause::Unknown(pattern) => {
+            Candidate::Unknown(pattern) => {
                 let nearer = pattern.nearer(step, self.grid.span_rev());
-                nearer.into_iter().map(Cause::Unknown).collect()
+                nearer.into_iter().map(Candidate::Unknown).collect()
             }
         };
         let others = few.only(&self.grid, &all[1..]);
@@ -492,7 +497,7 @@ impl<'a> Engine<'a> {
 }
 
 /// Amplitudes of block `n` of a fit in the effect's own units.
-fn amplitudes_of(pool: &Pool, whitened: &Whitened, fit: &evidence::Fit, n: usize) -> Estimate {
+fn amplitudes_of(pool: &DesignMatrix, whitened: &Whitened, fit: &evidence::Fit, n: usize) -> Estimate {
     let block = &pool.blocks[fit.set[n]];
     let place = fit.place(pool, n);
     let mean = fit.mean.rows(place.start, place.len());
@@ -504,7 +509,7 @@ fn amplitudes_of(pool: &Pool, whitened: &Whitened, fit: &evidence::Fit, n: usize
     }
 }
 
-#[path = "hidden.rs"]
-mod hidden;
+#[path = "nonstationary.rs"]
+mod nonstationary;
 #[path = "report.rs"]
 mod report;

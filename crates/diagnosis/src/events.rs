@@ -10,12 +10,12 @@ use rayon::prelude::*;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
+use super::design_matrix::DesignMatrix;
 use super::grid::Grid;
 use super::noise::Noise;
-use super::pool::Pool;
+use super::nuisance_patterns::Pattern;
 use super::reduce::{Point, ReducedRun};
 use super::sectors::{SECTORS, Sector, sectors};
-use super::unknown::Pattern;
 use super::waves::{WAVES, waves};
 use gearmodel::effect::Rig;
 use std::f64::consts::TAU;
@@ -77,7 +77,13 @@ pub(super) fn steps_cost_nats(steps: usize) -> f64 {
 /// Looks for steps in what a model (column, amplitude) leaves; `steady` is the same without what accumulates, which could
 /// have taken the steps for a drift.
 #[must_use]
-pub fn find(grid: &Grid, pool: &Pool, noise: &Noise, amplitudes: &[(usize, f64)], steady: &[(usize, f64)]) -> Events {
+pub fn find(
+    grid: &Grid,
+    pool: &DesignMatrix,
+    noise: &Noise,
+    amplitudes: &[(usize, f64)],
+    steady: &[(usize, f64)],
+) -> Events {
     let mut found = Events::default();
     let mut look = |rest: &[f64]| {
         let sectors = sectors(grid, noise, rest);
@@ -126,10 +132,10 @@ fn single_steps(grid: &Grid, sectors: &[Sector], rest: &[f64]) -> Vec<Pattern> {
     for _ in 0..SINGLE_STEPS {
         let sums = Sums::new(sectors, &left);
         let end = sectors.len();
-        let stays = (1..end).map(|from| sums.stretch(from, end));
+        let stays = (1..end).map(|from| sums.segment(from, end));
         let goes_back = (1..end).flat_map(|from| (from + SECTORS / 2..end).map(move |until| (from, until)));
-        let goes_back = goes_back.map(|(from, until)| sums.stretch(from, until));
-        let most = |a: &Stretch, b: &Stretch| a.gain.total_cmp(&b.gain);
+        let goes_back = goes_back.map(|(from, until)| sums.segment(from, until));
+        let most = |a: &Segment, b: &Segment| a.gain.total_cmp(&b.gain);
         let (Some(once), back) = (stays.max_by(most), goes_back.max_by(most)) else { break };
         let best = back.filter(|back| back.gain > once.gain + SINGLE_STEP_NATS).unwrap_or(once);
         if best.gain < SINGLE_STEP_NATS {
@@ -150,7 +156,7 @@ fn single_steps(grid: &Grid, sectors: &[Sector], rest: &[f64]) -> Vec<Pattern> {
 }
 
 /// Sectors that stand off the others.
-struct Stretch {
+struct Segment {
     from: usize,
     until: usize,
     /// By how much, rad.
@@ -172,7 +178,7 @@ impl Sums {
         Self(sums)
     }
 
-    fn stretch(&self, from: usize, until: usize) -> Stretch {
+    fn segment(&self, from: usize, until: usize) -> Segment {
         // Neighbouring sectors of a turn share its level: as many independent values as half turns.
         let share = 2.0 / SECTORS as f64;
         let [total, sum] = self.0[self.0.len() - 1];
@@ -180,7 +186,7 @@ impl Sums {
         let outside = total - inside;
         let step_rad = inside_sum / inside - (sum - inside_sum) / outside;
         let gain = 0.5 * share * step_rad * step_rad * inside * outside / total;
-        Stretch { from, until, step_rad, gain }
+        Segment { from, until, step_rad, gain }
     }
 }
 
@@ -635,7 +641,7 @@ fn incoherent(grid: &Grid, band: Band, values: &[f64]) -> Vec<f64> {
                 normal.ger(grid.weight[place], z, z, 1.0);
                 right.axpy(grid.weight[place] * rest[place], z, 1.0);
             }
-            // A short stretch does not fix its waves: a little of nothing is added.
+            // A short segment does not fix its waves: a little of nothing is added.
             let ridge = 1e-6 * normal.diagonal().max();
             for k in 0..WAVES {
                 normal[(k, k)] += ridge;

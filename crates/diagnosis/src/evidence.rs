@@ -6,9 +6,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
+use super::design_matrix::{Block, DesignMatrix, RESIDUAL, WIDE, ZERO};
 use super::noise::Whitened;
-use super::normal::{Normal, select};
-use super::pool::{Block, Pool, RESIDUAL, WIDE, ZERO};
+use super::normal_equations::{NormalEquations, select};
 
 /// Scales of a candidate, rad: 1 µrad to 1 mrad.
 const SCALES: usize = 11;
@@ -47,14 +47,14 @@ impl Fit {
 
     /// Where block `n` of the set stands among the columns.
     #[must_use]
-    pub fn place(&self, pool: &Pool, n: usize) -> std::ops::Range<usize> {
+    pub fn place(&self, pool: &DesignMatrix, n: usize) -> std::ops::Range<usize> {
         let first = 1 + self.set[..n].iter().map(|b| pool.blocks[*b].width()).sum::<usize>();
         first..first + pool.blocks[self.set[n]].width()
     }
 
     /// RMS of the trace of block `n` of the set, rad.
     #[must_use]
-    pub fn rms_rad(&self, pool: &Pool, n: usize) -> f64 {
+    pub fn rms_rad(&self, pool: &DesignMatrix, n: usize) -> f64 {
         let place = self.place(pool, n);
         let mut square = 0.0;
         for a in place.clone() {
@@ -81,10 +81,10 @@ fn prior(blocks: &[Block], set: &[usize], scales_rad: &[f64]) -> Vec<f64> {
 }
 
 /// Fits a set, its scales moved to where the evidence is largest. `None` where the columns cannot be told apart at all.
-pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -> Option<Fit> {
+pub fn fit(pool: &DesignMatrix, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -> Option<Fit> {
     let blocks = &pool.blocks;
     let columns = columns(blocks, set);
-    let normal = Normal::new(blocks, whitened, set, &columns);
+    let normal = NormalEquations::new(blocks, whitened, set, &columns);
     let mut scales_rad: Vec<f64> = (0..set.len()).map(|n| start_rad.get(n).copied().unwrap_or(3e-5)).collect();
     let mut solved = normal.solve(&prior(blocks, set, &scales_rad))?;
     for _ in 0..8 {
@@ -120,8 +120,8 @@ pub fn fit(pool: &Pool, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -
 
 /// Covariance of a fit's amplitudes under the noise that it was made with.
 #[must_use]
-pub fn covariance(pool: &Pool, whitened: &Whitened, fit: &Fit) -> DMatrix<f64> {
-    let normal = Normal::new(&pool.blocks, whitened, &fit.set, &fit.columns);
+pub fn covariance(pool: &DesignMatrix, whitened: &Whitened, fit: &Fit) -> DMatrix<f64> {
+    let normal = NormalEquations::new(&pool.blocks, whitened, &fit.set, &fit.columns);
     let width = fit.columns.len();
     // What could be fitted can be solved.
     let solved = normal.solve(&prior(&pool.blocks, &fit.set, &fit.scales_rad));
@@ -130,7 +130,7 @@ pub fn covariance(pool: &Pool, whitened: &Whitened, fit: &Fit) -> DMatrix<f64> {
 
 /// Log evidence of a fit's set at its scales under another noise, whose matrix holds the residual and the fit's columns only.
 #[must_use]
-pub(super) fn at_scales(pool: &Pool, whitened: &Whitened, fit: &Fit) -> f64 {
+pub(super) fn at_scales(pool: &DesignMatrix, whitened: &Whitened, fit: &Fit) -> f64 {
     let columns: Vec<usize> = (1..=fit.columns.len()).collect();
     let (g, b) = select(&whitened.gram, &columns);
     let evidence = log_evidence(g, b, &prior(&pool.blocks, &fit.set, &fit.scales_rad));
@@ -138,11 +138,12 @@ pub(super) fn at_scales(pool: &Pool, whitened: &Whitened, fit: &Fit) -> f64 {
 }
 
 fn log_evidence(gram: DMatrix<f64>, rhs: DVector<f64>, variances: &[f64]) -> f64 {
-    Normal::dense(gram, rhs).solve(variances).map_or(f64::NEG_INFINITY, |solved| solved.log_evidence)
+    NormalEquations::dense(gram, rhs).solve(variances).map_or(f64::NEG_INFINITY, |solved| solved.log_evidence)
 }
 
 fn one_sided(block: &Block) -> bool {
-    matches!(block.cause, super::pool::Cause::Effect { effect, .. } if effect.one_sided()) && block.width() == 1
+    matches!(block.cause, super::design_matrix::Candidate::Effect { effect, .. } if effect.one_sided())
+        && block.width() == 1
 }
 
 /// Log of how much more probable a half-line prior makes it: log 2 Φ(m/σ).
@@ -166,7 +167,7 @@ fn normal_cdf(z: f64) -> f64 {
 }
 
 /// How much each candidate's addition to a fitted set would raise the log evidence, its scale averaged over the grid.
-pub fn scan(pool: &Pool, whitened: &Whitened, fit: &Fit, candidates: &[usize]) -> Vec<f64> {
+pub fn scan(pool: &DesignMatrix, whitened: &Whitened, fit: &Fit, candidates: &[usize]) -> Vec<f64> {
     use rayon::prelude::*;
     let blocks = &pool.blocks;
     let gram = &whitened.gram;

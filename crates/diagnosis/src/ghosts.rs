@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 
 use super::grid::Grid;
 use super::noise::Noise;
-use super::unknown::{HIGHEST_ORDER, Pattern, Weight};
-use gearmodel::effect::{Shaft, Station};
+use super::nuisance_patterns::{HIGHEST_ORDER, Pattern, Weight};
+use gearmodel::effect::{OperatingPoint, Shaft};
 
 /// Highest order looked for.
 const HIGHEST: usize = 340;
@@ -80,7 +80,7 @@ struct Spectrum {
 
 impl Spectrum {
     /// Of the places that count; `None` where they leave much of the turn out.
-    fn new(grid: &Grid, rest: &[f64], shaft: Shaft, counts: &dyn Fn(&Station) -> bool) -> Option<Self> {
+    fn new(grid: &Grid, rest: &[f64], shaft: Shaft, counts: &dyn Fn(&OperatingPoint) -> bool) -> Option<Self> {
         let mut sums = vec![(0.0, 0.0); BINS];
         for ((at, y), w) in grid.places.iter().zip(rest).zip(&grid.weight).filter(|((at, _), _)| counts(at)) {
             let bin = ((at.angle_rad(shaft) / TAU).rem_euclid(1.0) * BINS as f64) as usize;

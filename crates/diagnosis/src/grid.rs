@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use super::reduce::{Point, ReducedRun};
 use gearmodel::Direction;
-use gearmodel::effect::{Ledger, Plan, Rig, Station};
+use gearmodel::effect::{OperatingPoint, Plan, RevolutionsByLoad, Rig};
 
 /// Bins a turn where there are few revolutions.
 const MOST_BINS: usize = 720;
@@ -35,12 +35,12 @@ pub struct Grid {
     pub revolutions: Vec<Revolution>,
     /// Runs' senses.
     pub directions: Vec<Direction>,
-    /// Station of every place.
-    pub places: Vec<Station>,
+    /// OperatingPoint of every place.
+    pub places: Vec<OperatingPoint>,
     /// Cell of every place.
     pub cell_of: Vec<usize>,
-    /// Station of every cell.
-    pub cells: Vec<Station>,
+    /// OperatingPoint of every cell.
+    pub cells: Vec<OperatingPoint>,
     /// Part of its revolution at which every cell stands, 0 to 1.
     pub part_of_cell: Vec<f64>,
     /// Residual at every place, rad.
@@ -107,8 +107,8 @@ impl Grid {
 
         let start_s = runs.iter().filter_map(|run| run.points.first()).map(|p| p.time_s).fold(f64::INFINITY, f64::min);
         let loads_nm = levels(runs.iter().flat_map(|run| run.points.iter().map(|p| p.load_nm)));
-        let mut ledger = Ledger::default();
-        for (slot, load) in ledger.load_nm.iter_mut().zip(&loads_nm) {
+        let mut revolutions_by_load = RevolutionsByLoad::default();
+        for (slot, load) in revolutions_by_load.load_nm.iter_mut().zip(&loads_nm) {
             *slot = *load;
         }
         let mut order: Vec<usize> = (0..runs.len()).filter(|n| !runs[*n].points.is_empty()).collect();
@@ -142,21 +142,28 @@ impl Grid {
             grid.plan.starts_s.push(first.time_s - start_s);
             grid.plan.senses[usize::from(run.direction == Direction::Cw)] = true;
             grid.plan.revolutions += way_of(run, &last);
-            grid.add_run(rig, run, n, &RunFrame { turns: turns[n], merge, closes, start_s, mean_speed }, &mut ledger);
+            grid.add_run(
+                rig,
+                run,
+                n,
+                &RunFrame { turns: turns[n], merge, closes, start_s, mean_speed },
+                &mut revolutions_by_load,
+            );
         }
         grid.plan.runs = grid.directions.len();
         grid.plan.loads_nm = loads_nm;
         grid.plan.speeds_rad_per_s = levels(speeds.into_iter());
         grid.plan.duration_s = end_s - start_s;
-        grid.plan.turns =
-            [|at: &Station| at.theta1_rad, |at: &Station| at.theta2_rad].map(|angle: fn(&Station) -> f64| {
+        grid.plan.turns = [|at: &OperatingPoint| at.theta1_rad, |at: &OperatingPoint| at.theta2_rad].map(
+            |angle: fn(&OperatingPoint) -> f64| {
                 let (low, high) = grid
                     .places
                     .iter()
                     .map(angle)
                     .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
                 ((high - low) / TAU).clamp(0.0, 1.0)
-            });
+            },
+        );
         grid
     }
 
@@ -170,7 +177,14 @@ impl Grid {
         (high - low) / TAU
     }
 
-    fn add_run(&mut self, rig: &Rig, run: &ReducedRun, number: usize, frame: &RunFrame, ledger: &mut Ledger) {
+    fn add_run(
+        &mut self,
+        rig: &Rig,
+        run: &ReducedRun,
+        number: usize,
+        frame: &RunFrame,
+        revolutions_by_load: &mut RevolutionsByLoad,
+    ) {
         let index = self.directions.len();
         self.directions.push(run.direction);
         let bins = self.bins;
@@ -178,16 +192,16 @@ impl Grid {
         let mut sums = vec![Sum::default(); revolutions * bins];
         let origin_rad = run.points[0].theta1_rad;
         let speeds = local_speeds(&run.points, frame.mean_speed);
-        let mut books = vec![Ledger::default(); revolutions * bins];
+        let mut books = vec![RevolutionsByLoad::default(); revolutions * bins];
         let mut speed_sums = vec![0.0; revolutions * bins];
         let mut keys = Vec::with_capacity(run.points.len());
         let mut before = origin_rad;
         for (point, speed) in run.points.iter().zip(&speeds) {
             let step_rev = (point.theta1_rad - before) / TAU;
             before = point.theta1_rad;
-            let slot = nearest(&ledger.load_nm, point.load_nm);
-            ledger.signed_rev[slot] += step_rev;
-            ledger.way_rev[slot] += step_rev.abs();
+            let slot = nearest(&revolutions_by_load.load_nm, point.load_nm);
+            revolutions_by_load.signed_rev[slot] += step_rev;
+            revolutions_by_load.way_rev[slot] += step_rev.abs();
             // Bins count from where the run begins, so that none holds both ends of a revolution.
             let way_rev = (point.theta1_rad - origin_rad).abs() / TAU;
             let turn = (way_rev as usize).min(frame.turns - 1);
@@ -208,11 +222,11 @@ impl Grid {
             sum.rho += w * point.rho_rad;
             sum.rho2 += w * point.rho_rad * point.rho_rad;
             sum.load += w * point.load_nm;
-            sum.way += w * ledger.way_rev.iter().sum::<f64>();
+            sum.way += w * revolutions_by_load.way_rev.iter().sum::<f64>();
             speed_sums[key] += w * speed;
-            for slot in 0..ledger.load_nm.len() {
-                books[key].signed_rev[slot] += w * ledger.signed_rev[slot];
-                books[key].way_rev[slot] += w * ledger.way_rev[slot];
+            for slot in 0..revolutions_by_load.load_nm.len() {
+                books[key].signed_rev[slot] += w * revolutions_by_load.signed_rev[slot];
+                books[key].way_rev[slot] += w * revolutions_by_load.way_rev[slot];
             }
         }
         let steady = frame.closes && steady_load(&run.points);
@@ -230,7 +244,7 @@ impl Grid {
                     continue;
                 }
                 let w = sum.weight;
-                let mut station = rig.station(sum.theta1 / w, sum.theta2 / w, run.direction);
+                let mut station = rig.operating_point(sum.theta1 / w, sum.theta2 / w, run.direction);
                 station.load_nm = sum.load / w;
                 station.time_s = sum.time / w;
                 station.way_rev = sum.way / w;
@@ -238,8 +252,8 @@ impl Grid {
                 station.run = index;
                 let (off_rad, variance_rad2) = sum.spread();
                 station.spread_rad = variance_rad2.sqrt();
-                station.ledger = Ledger {
-                    load_nm: ledger.load_nm,
+                station.revolutions_by_load = RevolutionsByLoad {
+                    load_nm: revolutions_by_load.load_nm,
                     signed_rev: books[key].signed_rev.map(|x| x / w),
                     way_rev: books[key].way_rev.map(|x| x / w),
                 };
@@ -268,7 +282,7 @@ impl Grid {
             let (mean_rad, variance_rad2) = sum.spread();
             let step_rad = run.direction.sign() * (mean_rad - first_rad);
             let (theta1_rad, theta2_rad) = (cell.theta1_rad + step_rad, cell.theta2_rad + cell.ratio * step_rad);
-            cell.take_angles_of(&rig.station(theta1_rad, theta2_rad, run.direction));
+            cell.take_angles_of(&rig.operating_point(theta1_rad, theta2_rad, run.direction));
             cell.spread_rad = variance_rad2.sqrt();
         }
         self.place_of_point[number] = keys.into_iter().map(|key| place_of_key[key]).collect();
@@ -284,7 +298,7 @@ struct RunFrame {
     mean_speed: f64,
 }
 
-/// Distinct values, at most as many as a ledger holds; nearer than 2 % of the largest count as one.
+/// Distinct values, at most as many as a revolutions_by_load holds; nearer than 2 % of the largest count as one.
 fn levels(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut found: Vec<(f64, f64)> = Vec::new();
     let mut sorted: Vec<f64> = values.filter(|v| v.is_finite()).collect();
@@ -299,8 +313,8 @@ fn levels(values: impl Iterator<Item = f64>) -> Vec<f64> {
             _ => found.push((value, 1.0)),
         }
     }
-    // More levels than a ledger has: the nearest neighbours become one.
-    while found.len() > gearmodel::effect::LEDGER_LOADS {
+    // More levels than a revolutions_by_load has: the nearest neighbours become one.
+    while found.len() > gearmodel::effect::MOST_LOADS {
         let Some(at) =
             (1..found.len()).min_by(|a, b| (found[*a].0 - found[*a - 1].0).total_cmp(&(found[*b].0 - found[*b - 1].0)))
         else {
@@ -341,7 +355,7 @@ fn local_speeds(points: &[Point], mean: f64) -> Vec<f64> {
             }
             let span_s = points[high].time_s - points[low].time_s;
             let speed = (points[high].theta1_rad - points[low].theta1_rad) / span_s;
-            // A pause or a gap inside the stretch says nothing about the speed.
+            // A pause or a gap inside the segment says nothing about the speed.
             if span_s > 0.0 && speed.is_finite() && speed * mean > 0.0 && (speed / mean - 1.0).abs() < 0.5 {
                 speed
             } else {

@@ -13,8 +13,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{Cholesky, DMatrix, Dyn, SymmetricEigen};
 use rayon::prelude::*;
 
+use super::design_matrix::DesignMatrix;
 use super::grid::Grid;
-use super::pool::Pool;
 use super::waves::{KINDS, ORDERS, STEADY, WAVES, kind, members, waves};
 
 /// Least scatter taken of an order, rad: a hundredth of the finest rig's.
@@ -80,7 +80,7 @@ impl Noise {
     /// Estimates the scatter from what differs between revolutions of a run after the model `amplitudes` (column,
     /// amplitude) is taken off.
     #[must_use]
-    pub fn estimate(grid: &Grid, pool: &Pool, amplitudes: &[(usize, f64)]) -> Self {
+    pub fn estimate(grid: &Grid, pool: &DesignMatrix, amplitudes: &[(usize, f64)]) -> Self {
         let residual_waves: Vec<_> = pool
             .waves
             .iter()
@@ -158,7 +158,7 @@ impl Noise {
 
     /// XᵀV⁻¹X and log det V.
     #[must_use]
-    pub fn whiten(&self, grid: &Grid, pool: &Pool) -> Whitened {
+    pub fn whiten(&self, grid: &Grid, pool: &DesignMatrix) -> Whitened {
         self.within_runs(grid, pool, None).between_runs(self.run_ratio)
     }
 
@@ -174,7 +174,7 @@ impl Noise {
 
     /// Everything that does not depend on the scatter between runs, of all columns or of some.
     #[must_use]
-    pub(super) fn within_runs(&self, grid: &Grid, pool: &Pool, only: Option<&[usize]>) -> WithinRuns {
+    pub(super) fn within_runs(&self, grid: &Grid, pool: &DesignMatrix, only: Option<&[usize]>) -> WithinRuns {
         let precision = 1.0 / self.white_rad2;
         let wave_rad2 = wave_rad2(&self.order_rad2);
         let mut gram = match only {

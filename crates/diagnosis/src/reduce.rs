@@ -1,20 +1,20 @@
-//! Samples → points: one pass that averages the residual over short stretches of the driver's turn.
+//! Samples → points: one pass that averages the residual over short segments of the driver's turn.
 //!
-//! The residual ρ = (θ2 − f(θ1)) − TE_nominal(θ1, sense, load) is averaged over stretches of a quarter degree, so that
+//! The residual ρ = (θ2 − f(θ1)) − TE_nominal(θ1, sense, load) is averaged over segments of a quarter degree, so that
 //! everything after is independent of the log's length. Nothing is lost to a faster sampling than that but what averages
-//! out in a stretch, the encoders' line phase, which is collected beside ([`LinePhase`]).
+//! out in a segment, the encoders' line phase, which is collected beside ([`LinePhase`]).
 
 use std::f64::consts::TAU;
 
 use super::line_phase::LinePhase;
 use super::nominal::Nominal;
 use gearmodel::Direction;
-use gearmodel::effect::{Station, Term};
+use gearmodel::effect::{OperatingPoint, Term};
 
-/// Length of a stretch of the driver's turn, rad.
-const STRETCH_RAD: f64 = TAU / 1440.0;
+/// Length of a segment of the driver's turn, rad.
+const SEGMENT_RAD: f64 = TAU / 1440.0;
 
-/// A stretch: mean values of its samples.
+/// A segment: mean values of its samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Point {
     /// Time, s.
@@ -67,14 +67,14 @@ pub struct Sample {
 pub struct Reducer<'a> {
     nominal: &'a Nominal,
     run: ReducedRun,
-    stretch: Stretch,
+    segment: Segment,
     lines: LinePhase,
     documented_lines: Vec<&'a Term>,
 }
 
-/// The stretch being filled, with the pair's kinematics at its first sample.
+/// The segment being filled, with the pair's kinematics at its first sample.
 #[derive(Clone, Copy, Debug, Default)]
-struct Stretch {
+struct Segment {
     origin: Point,
     ratio: f64,
     ratio_slope: f64,
@@ -89,7 +89,7 @@ impl<'a> Reducer<'a> {
     pub fn new(nominal: &'a Nominal, direction: Direction, speed_rpm: f64) -> Self {
         let run = ReducedRun { direction, speed_rpm, points: Vec::new(), within_rad2: 0.0, samples: 0.0 };
         let lines = LinePhase::new(nominal.rig().lines);
-        Self { nominal, run, stretch: Stretch::default(), lines, documented_lines: nominal.line_errors().collect() }
+        Self { nominal, run, segment: Segment::default(), lines, documented_lines: nominal.line_errors().collect() }
     }
 
     /// Takes a sample; one with a gap (NaN) is skipped.
@@ -97,13 +97,13 @@ impl<'a> Reducer<'a> {
         if !(sample.theta1_rad.is_finite() && sample.theta2_rad.is_finite()) {
             return;
         }
-        let filled = self.stretch.sum.samples > 0.0;
-        if !filled || (sample.theta1_rad - self.stretch.origin.theta1_rad).abs() >= STRETCH_RAD {
+        let filled = self.segment.sum.samples > 0.0;
+        if !filled || (sample.theta1_rad - self.segment.origin.theta1_rad).abs() >= SEGMENT_RAD {
             if filled {
                 self.close();
             }
             let at = self.nominal.rig().pair().at(sample.theta1_rad);
-            self.stretch = Stretch {
+            self.segment = Segment {
                 origin: Point { theta1_rad: sample.theta1_rad, time_s: sample.time_s, ..Point::default() },
                 ratio: at.ratio,
                 ratio_slope: at.mu_rad.tan() * at.ratio * (1.0 + at.ratio),
@@ -112,31 +112,31 @@ impl<'a> Reducer<'a> {
                 squares: 0.0,
             };
         }
-        let stretch = &mut self.stretch;
-        // f about the stretch's start to second order; a quarter degree leaves 0.05 µrad.
-        let step = sample.theta1_rad - stretch.origin.theta1_rad;
-        let f_rad = stretch.theta2_rad + step * (stretch.ratio + 0.5 * stretch.ratio_slope * step);
+        let segment = &mut self.segment;
+        // f about the segment's start to second order; a quarter degree leaves 0.05 µrad.
+        let step = sample.theta1_rad - segment.origin.theta1_rad;
+        let f_rad = segment.theta2_rad + step * (segment.ratio + 0.5 * segment.ratio_slope * step);
         let mut deviation = sample.theta2_rad - f_rad;
         if !self.documented_lines.is_empty() {
             let (theta1_rad, theta2_rad) = (sample.theta1_rad, sample.theta2_rad);
-            let at = Station { theta1_rad, theta2_rad, ratio: stretch.ratio, ..Station::default() };
+            let at = OperatingPoint { theta1_rad, theta2_rad, ratio: segment.ratio, ..OperatingPoint::default() };
             let rig = self.nominal.rig();
             deviation -= self.documented_lines.iter().map(|term| term.te_rad(rig, &at)).sum::<f64>();
         }
-        stretch.sum.time_s += sample.time_s - stretch.origin.time_s;
-        stretch.sum.theta1_rad += step;
-        stretch.sum.spread_rad2 += step * step;
-        stretch.sum.theta2_rad += f_rad - stretch.theta2_rad;
-        stretch.sum.rho_rad += deviation;
-        stretch.sum.load_nm += sample.load_nm;
-        stretch.sum.samples += 1.0;
-        stretch.squares += deviation * deviation;
-        let waves = self.lines.push(sample.theta1_rad, sample.theta2_rad, stretch.ratio, deviation);
-        stretch.sum.lines.iter_mut().zip(waves).for_each(|(sum, x)| *sum += x);
+        segment.sum.time_s += sample.time_s - segment.origin.time_s;
+        segment.sum.theta1_rad += step;
+        segment.sum.spread_rad2 += step * step;
+        segment.sum.theta2_rad += f_rad - segment.theta2_rad;
+        segment.sum.rho_rad += deviation;
+        segment.sum.load_nm += sample.load_nm;
+        segment.sum.samples += 1.0;
+        segment.squares += deviation * deviation;
+        let waves = self.lines.push(sample.theta1_rad, sample.theta2_rad, segment.ratio, deviation);
+        segment.sum.lines.iter_mut().zip(waves).for_each(|(sum, x)| *sum += x);
     }
 
     fn close(&mut self) {
-        let Stretch { origin, theta2_rad, sum, squares, .. } = self.stretch;
+        let Segment { origin, theta2_rad, sum, squares, .. } = self.segment;
         let n = sum.samples;
         let mean = sum.rho_rad / n;
         let step = sum.theta1_rad / n;
@@ -159,7 +159,7 @@ impl<'a> Reducer<'a> {
     /// The run as points, and what was seen of the encoders' lines.
     #[must_use]
     pub fn finish(mut self) -> (ReducedRun, LinePhase) {
-        if self.stretch.sum.samples > 0.0 {
+        if self.segment.sum.samples > 0.0 {
             self.close();
         }
         self.lines.flush();

@@ -3,8 +3,8 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::*;
+use crate::cross_validation::{HeldOut, Selection};
 use crate::line_phase::LineError;
-use crate::shrink::{HeldOut, Selection};
 use gearmodel::effect::{Carrier, Parameter, Parity, Signature, Value};
 
 /// Under 1 it flattens what the noise model's own error makes too sure; calibrated on simulated campaigns.
@@ -64,17 +64,17 @@ struct Finding {
     shape: gearmodel::effect::Shape,
     rms_rad: f64,
     shrink: Option<f64>,
-    twins: Vec<(usize, f64)>,
+    confusable: Vec<(usize, f64)>,
     /// Most that its probability may be, whatever the evidence.
     most: f64,
 }
 
 impl Engine<'_> {
     pub(super) fn report(&self, lines: &[LineError]) -> Option<Diagnosis> {
-        let attribution = attribute::attribute(&self.pool, &self.models, SHARPNESS);
+        let posterior = posterior::posterior(&self.pool, &self.models, SHARPNESS);
         let best = self.models.first()?;
         let mut search = self.search_in(&self.pool, &self.whitened);
-        let mut findings = self.findings(&attribution, best, &mut search, lines);
+        let mut findings = self.findings(&posterior, best, &mut search, lines);
 
         // Held-out shrink: of the best model, and of each effect alone.
         let mut columns: Vec<usize> = best.fit.columns.clone();
@@ -90,7 +90,7 @@ impl Engine<'_> {
         let explained_rad2 = lines_rad2 + self.aside.mean_square_rad2();
         // What the place's own samples scatter, less what the lines explain of it.
         let within_rad2 = self.grid.within_rad2 / self.grid.samples;
-        let mut gap = shrink::gap(&before, &after, floor_rad2, within_rad2, explained_rad2, found);
+        let mut gap = cross_validation::gap(&before, &after, floor_rad2, within_rad2, explained_rad2, found);
         let reducible = before.mean() + explained_rad2 - floor_rad2;
         for finding in &mut findings {
             finding.shrink = match finding.block {
@@ -114,7 +114,7 @@ impl Engine<'_> {
             .sum::<f64>();
         // What is too small to matter beside what was found, or beside what does not repeat.
         let unknown_rad2: f64 = (0..best.fit.set.len())
-            .filter(|n| matches!(self.pool.blocks[best.fit.set[*n]].cause, Cause::Unknown(_)))
+            .filter(|n| matches!(self.pool.blocks[best.fit.set[*n]].cause, Candidate::Unknown(_)))
             .map(|n| best.fit.rms_rad(&self.pool, n).powi(2))
             .sum();
         let least_rad = least_rad(total_rad2 + unknown_rad2 + explained_rad2, self.rings_rad2(best), gap.floor_rad);
@@ -143,7 +143,7 @@ impl Engine<'_> {
         }
         findings.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.number.cmp(&b.number)));
 
-        let Named { groups, verdict, identical } = self.verdict(&findings, &attribution, best);
+        let Named { groups, verdict, identical } = self.verdict(&findings, &posterior, best);
         // Which of the same traces the search met first says nothing: they are equally probable.
         for (members, probability) in identical {
             for finding in findings.iter_mut().filter(|f| members.contains(&f.number)) {
@@ -151,14 +151,14 @@ impl Engine<'_> {
             }
         }
         findings.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.number.cmp(&b.number)));
-        let unknown = self.unknown(&attribution, best, gap.floor_rad, lines_rad2);
+        let unknown = self.unknown(&posterior, best, gap.floor_rad, lines_rad2);
         let mut verdict = verdict;
         if unknown.probability > NAMED {
             verdict.push(Verdict::Name("unknown".to_owned()));
         }
         gap.budget = self.budget(best, lines, reducible);
         let found = self.found(&findings, &verdict);
-        let location = locate::locate(&locate::Inputs {
+        let location = localisation::locate(&localisation::Inputs {
             rig: self.rig,
             grid: &self.grid,
             pool: &self.pool,
@@ -167,10 +167,11 @@ impl Engine<'_> {
             lines,
         });
         let confusability = self.confusability(&findings, best);
-        let mut warnings = locate::warnings(&self.grid, &self.noise);
+        let mut warnings = localisation::warnings(&self.grid, &self.noise);
         warnings.extend(self.mimics(&findings, &verdict));
-        let next = next::experiments(&self.grid, &findings_for_next(&findings, &groups), &unknown, &warnings);
-        let curves = locate::curves(&self.grid, &self.pool, &best.fit);
+        let next =
+            experiment_design::experiments(&self.grid, &findings_for_next(&findings, &groups), &unknown, &warnings);
+        let curves = localisation::curves(&self.grid, &self.pool, &best.fit);
         Some(Diagnosis {
             gap,
             location,
@@ -202,7 +203,7 @@ impl Engine<'_> {
     /// Every effect with its best block, its amplitudes as if it were the one, and who cannot be told from it.
     fn findings(
         &self,
-        attribution: &Attribution,
+        posterior: &Posterior,
         best: &Model,
         search: &mut Search<'_>,
         lines: &[LineError],
@@ -211,13 +212,13 @@ impl Engine<'_> {
         let empty = search.model(Vec::new(), None);
         for (number, effect) in LIBRARY.iter().enumerate() {
             let own: Vec<usize> = (0..self.pool.blocks.len())
-                .filter(|b| matches!(&self.pool.blocks[*b].cause, Cause::Effect { number: n, .. } if *n == number))
+                .filter(|b| matches!(&self.pool.blocks[*b].cause, Candidate::Effect { number: n, .. } if *n == number))
                 .collect();
             if let Some(encoder) = INTERPOLATION.iter().position(|n| *n == effect.name()) {
                 findings.push(self.line_finding(number, encoder, lines));
                 continue;
             }
-            let block = attribution.block[number].or_else(|| {
+            let block = posterior.block[number].or_else(|| {
                 // Never part of a good model: the shape that fits best alone.
                 let empty = empty.as_ref()?;
                 let gains = evidence::scan(&self.pool, &self.whitened, &empty.fit, &own);
@@ -230,7 +231,7 @@ impl Engine<'_> {
                     .set
                     .iter()
                     .copied()
-                    .find(|b| attribute::angle_deg(&self.pool, &self.whitened, *b, block) < attribute::SAME_DEG)
+                    .find(|b| posterior::angle_deg(&self.pool, &self.whitened, *b, block) < posterior::SAME_DEG)
             });
             let in_best = stands_for == Some(block);
             let mut model_with = |out: Option<usize>, b: usize| {
@@ -243,11 +244,11 @@ impl Engine<'_> {
             } else {
                 stands_for.and_then(|b| model_with(Some(b), block)).map(|m| m.score)
             };
-            let twins = match reference.filter(|_| attribution.probability[number] > 0.02) {
-                Some(reference) => twins(
+            let confusable = match reference.filter(|_| posterior.probability[number] > 0.02) {
+                Some(reference) => confusable(
                     &self.pool,
                     &self.whitened,
-                    attribution,
+                    posterior,
                     number,
                     &mut |b| model_with(stands_for, b).map(|m| m.score),
                     reference.max(best.score - 3.0),
@@ -262,19 +263,19 @@ impl Engine<'_> {
                 Some((self.raw(m, n), m.fit.rms_rad(&self.pool, n)))
             });
             let shape = match &self.pool.blocks[block].cause {
-                Cause::Effect { shape, .. } => shape.clone(),
-                Cause::Unknown(_) => Vec::new(),
+                Candidate::Effect { shape, .. } => shape.clone(),
+                Candidate::Unknown(_) => Vec::new(),
             };
             let rms_rad = estimate.as_ref().map_or(0.0, |(_, rms)| *rms);
             findings.push(Finding {
                 number,
-                probability: attribution.probability[number].min(1.0),
+                probability: posterior.probability[number].min(1.0),
                 block: Some(block),
                 estimate: estimate.map(|(e, _)| e),
                 shape,
                 rms_rad,
                 shrink: None,
-                twins,
+                confusable,
                 most: 1.0,
             });
         }
@@ -305,7 +306,7 @@ impl Engine<'_> {
             shape: strongest.and_then(|l| Some(vec![l.order as f64, self.rig.lines[encoder]?])).unwrap_or_default(),
             rms_rad,
             shrink: None,
-            twins: Vec::new(),
+            confusable: Vec::new(),
             most: 1.0,
         }
     }
@@ -339,33 +340,33 @@ impl Engine<'_> {
             parameters,
             shrink: finding.shrink.filter(|s| s.is_finite()),
             component: effect.component().to_owned(),
-            confused_with: finding.twins.iter().map(|(n, _)| LIBRARY[*n].name().to_owned()).collect(),
+            confused_with: finding.confusable.iter().map(|(n, _)| LIBRARY[*n].name().to_owned()).collect(),
             rms_rad: finding.rms_rad,
         }
     }
 
     /// Groups and what is named.
-    fn verdict(&self, findings: &[Finding], attribution: &Attribution, best: &Model) -> Named {
+    fn verdict(&self, findings: &[Finding], posterior: &Posterior, best: &Model) -> Named {
         let mut identical = Vec::new();
         let mut groups = Vec::new();
         let mut verdict = Vec::new();
         let mut done: Vec<usize> = Vec::new();
         for finding in findings {
             // A member of a group that was named before, or one that could only stand in for it.
-            if done.contains(&finding.number) || finding.twins.iter().any(|(n, _)| done.contains(n)) {
+            if done.contains(&finding.number) || finding.confusable.iter().any(|(n, _)| done.contains(n)) {
                 continue;
             }
             let members: Vec<usize> =
-                std::iter::once(finding.number).chain(finding.twins.iter().map(|(n, _)| *n)).collect();
+                std::iter::once(finding.number).chain(finding.confusable.iter().map(|(n, _)| *n)).collect();
             let probability = if finding.block.is_none() {
                 finding.probability
             } else {
                 self.models
                     .iter()
-                    .zip(&attribution.weights)
+                    .zip(&posterior.weights)
                     .filter(|(m, _)| {
                         m.fit.set.iter().any(|b| {
-                            matches!(&self.pool.blocks[*b].cause, Cause::Effect { number, .. } if members.contains(number))
+                            matches!(&self.pool.blocks[*b].cause, Candidate::Effect { number, .. } if members.contains(number))
                         })
                     })
                     .map(|(_, w)| w)
@@ -375,13 +376,13 @@ impl Engine<'_> {
             let probability = probability.min(finding.most);
             let in_best = finding.block.is_none()
                 || best.fit.set.iter().any(
-                    |b| matches!(&self.pool.blocks[*b].cause, Cause::Effect { number, .. } if members.contains(number)),
+                    |b| matches!(&self.pool.blocks[*b].cause, Candidate::Effect { number, .. } if members.contains(number)),
                 );
             if members.len() > 1 {
                 if probability < 0.02 {
                     continue;
                 }
-                let angle_deg = finding.twins.iter().map(|(_, a)| *a).fold(0.0, f64::max);
+                let angle_deg = finding.confusable.iter().map(|(_, a)| *a).fold(0.0, f64::max);
                 let names: Vec<String> = members.iter().map(|n| LIBRARY[*n].name().to_owned()).collect();
                 if angle_deg < IDENTICAL_DEG {
                     identical.push((members.clone(), probability));
@@ -399,20 +400,20 @@ impl Engine<'_> {
         Named { groups, verdict, identical }
     }
 
-    fn unknown(&self, attribution: &Attribution, best: &Model, floor_rad: f64, lines_rad2: f64) -> Unknown {
+    fn unknown(&self, posterior: &Posterior, best: &Model, floor_rad: f64, lines_rad2: f64) -> Unknown {
         let mut square = 0.0;
         let mut known = 0.0;
         let mut strongest: Option<(f64, &Pattern)> = None;
         for (n, b) in best.fit.set.iter().enumerate() {
             let size = best.fit.rms_rad(&self.pool, n).powi(2);
             match &self.pool.blocks[*b].cause {
-                Cause::Unknown(pattern) => {
+                Candidate::Unknown(pattern) => {
                     square += size;
                     if strongest.as_ref().is_none_or(|(s, _)| size > *s) {
                         strongest = Some((size, pattern));
                     }
                 }
-                Cause::Effect { .. } => known += size,
+                Candidate::Effect { .. } => known += size,
             }
         }
         // A resonance that was found rings whenever anything excites it; faster than the bins show, it cannot be told from knocks.
@@ -449,7 +450,7 @@ impl Engine<'_> {
         };
         let least_rad = least_rad.max(of_floor * floor_rad);
         let inexact = square > 0.0 && rms_rad < least_rad;
-        let probability = if inexact { attribution.unknown.min(INEXACT_PROBABILITY) } else { attribution.unknown };
+        let probability = if inexact { posterior.unknown.min(INEXACT_PROBABILITY) } else { posterior.unknown };
         let location = strongest
             .filter(|_| probability > 0.1)
             .map(|(_, pattern)| UnknownLocation { description: pattern.describe(), signature: pattern.signature() });
@@ -459,8 +460,8 @@ impl Engine<'_> {
     /// Where in a model's set resonances stand, and their frequencies, Hz.
     fn rings_hz(&self, model: &Model) -> impl Iterator<Item = (usize, f64)> {
         (0..model.fit.set.len()).filter_map(|n| match &self.pool.blocks[model.fit.set[n]].cause {
-            Cause::Effect { effect, shape, .. } => Some((n, effect.rings_hz(shape, &self.raw(model, n))?)),
-            Cause::Unknown(_) => None,
+            Candidate::Effect { effect, shape, .. } => Some((n, effect.rings_hz(shape, &self.raw(model, n))?)),
+            Candidate::Unknown(_) => None,
         })
     }
 
@@ -496,8 +497,8 @@ impl Engine<'_> {
                 * (share.abs() / reducible).sqrt();
             explained += share;
             let effect = match &self.pool.blocks[*b].cause {
-                Cause::Effect { effect, .. } => effect.name().to_owned(),
-                Cause::Unknown(pattern) => format!("unknown: {}", pattern.describe()),
+                Candidate::Effect { effect, .. } => effect.name().to_owned(),
+                Candidate::Unknown(pattern) => format!("unknown: {}", pattern.describe()),
             };
             rows.push(BudgetRow {
                 effect,
@@ -552,7 +553,7 @@ impl Engine<'_> {
                 chosen
                     .iter()
                     .map(|b| match (a.block, b.block) {
-                        (Some(a), Some(b)) if a != b => attribute::angle_deg(&self.pool, &self.whitened, a, b),
+                        (Some(a), Some(b)) if a != b => posterior::angle_deg(&self.pool, &self.whitened, a, b),
                         _ => 0.0,
                     })
                     .collect()
@@ -580,7 +581,7 @@ impl Engine<'_> {
                         continue;
                     }
                     // Where one alone looks like it, or both are one group, the sum says nothing new.
-                    let near = |m: usize, n: usize| attribute::angle_deg(&self.pool, &self.whitened, m, n) < MIMIC_DEG;
+                    let near = |m: usize, n: usize| posterior::angle_deg(&self.pool, &self.whitened, m, n) < MIMIC_DEG;
                     if near(block, x) || near(block, y) || near(x, y) || warnings.len() >= MOST_MIMICS {
                         continue;
                     }
@@ -623,12 +624,12 @@ impl Engine<'_> {
     }
 }
 
-fn findings_for_next(findings: &[Finding], groups: &[Group]) -> next::Open {
-    next::Open {
+fn findings_for_next(findings: &[Finding], groups: &[Group]) -> experiment_design::Open {
+    experiment_design::Open {
         groups: groups.iter().filter(|g| g.probability > 0.2).map(|g| g.members.clone()).collect(),
         unsure: findings
             .iter()
-            .filter(|f| f.probability > 0.05 && f.probability < 0.95 && f.twins.is_empty())
+            .filter(|f| f.probability > 0.05 && f.probability < 0.95 && f.confusable.is_empty())
             .map(|f| LIBRARY[f.number].name().to_owned())
             .collect(),
     }

@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
+use super::design_matrix::{Candidate, DesignMatrix, WIDE};
 use super::evidence::{Fit, fit, scan};
 use super::noise::Whitened;
-use super::pool::{Cause, Pool, WIDE};
 
 /// Prior odds that an effect of the library is there, before its shape is chosen.
 const EFFECT_ODDS: f64 = 0.04;
@@ -55,7 +55,7 @@ type Ranking = Vec<(usize, f64)>;
 
 /// Everything seen on the way.
 pub struct Search<'a> {
-    pool: &'a Pool,
+    pool: &'a DesignMatrix,
     whitened: &'a Whitened,
     /// Constant of this noise: what the evidence of the empty set lacks.
     offset: f64,
@@ -71,16 +71,16 @@ pub struct Search<'a> {
 impl<'a> Search<'a> {
     /// A search in a pool under one noise.
     #[must_use]
-    pub fn new(pool: &'a Pool, whitened: &'a Whitened, known: &[String], least_rad: f64) -> Self {
-        let unknowns = pool.blocks.iter().filter(|b| matches!(b.cause, Cause::Unknown(_))).count().max(1) as f64;
+    pub fn new(pool: &'a DesignMatrix, whitened: &'a Whitened, known: &[String], least_rad: f64) -> Self {
+        let unknowns = pool.blocks.iter().filter(|b| matches!(b.cause, Candidate::Unknown(_))).count().max(1) as f64;
         let priors = pool
             .blocks
             .iter()
             .map(|block| match &block.cause {
                 // What is known to be there needs no evidence.
-                Cause::Effect { effect, .. } if known.iter().any(|name| name == effect.name()) => KNOWN_NATS,
-                Cause::Effect { cost_nats, .. } => EFFECT_ODDS.ln() - cost_nats,
-                Cause::Unknown(pattern) => UNKNOWN_ODDS.ln() - unknowns.ln() - pattern.cost_nats(),
+                Candidate::Effect { effect, .. } if known.iter().any(|name| name == effect.name()) => KNOWN_NATS,
+                Candidate::Effect { cost_nats, .. } => EFFECT_ODDS.ln() - cost_nats,
+                Candidate::Unknown(pattern) => UNKNOWN_ODDS.ln() - unknowns.ln() - pattern.cost_nats(),
             })
             .collect();
         let offset = -0.5 * whitened.log_det - 0.5 * whitened.gram[(0, 0)];
@@ -90,8 +90,8 @@ impl<'a> Search<'a> {
 
     fn library(&self, block: usize) -> Option<usize> {
         match &self.pool.blocks[block].cause {
-            Cause::Effect { number, .. } => Some(*number),
-            Cause::Unknown(_) => None,
+            Candidate::Effect { number, .. } => Some(*number),
+            Candidate::Unknown(_) => None,
         }
     }
 

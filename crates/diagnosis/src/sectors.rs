@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::evidence;
 use super::grid::Grid;
 use super::noise::Noise;
-use super::unknown::Pattern;
+use super::nuisance_patterns::Pattern;
 
 /// Sectors a revolution.
 pub(super) const SECTORS: usize = 12;

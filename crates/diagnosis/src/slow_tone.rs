@@ -4,8 +4,8 @@
 use std::f64::consts::TAU;
 
 use super::grid::Grid;
+use super::nuisance_patterns::Pattern;
 use super::sectors::Sector;
-use super::unknown::Pattern;
 
 /// Steps of the search and of its refinement, in parts of what the campaign's length tells apart.
 const COARSE: f64 = 0.25;

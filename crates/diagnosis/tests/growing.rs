@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use diagnosis::grid::Grid;
 use diagnosis::reduce::{Point, ReducedRun};
 
-use gearmodel::effect::{Estimate, Rig, Station, Value, by_name};
+use gearmodel::effect::{Estimate, OperatingPoint, Rig, Value, by_name};
 use gearmodel::{Direction, EllipticalSpec, Errors, GearPair, NominalModel};
 use nalgebra::DMatrix;
 
@@ -25,7 +25,7 @@ fn document_rig() -> Rig {
     Rig::new(NominalModel::new(pair, Errors::default()).unwrap(), [None, None], Some(7.2e6))
 }
 
-fn row(rig: &Rig, name: &str, shape: &[f64], at: &Station) -> Vec<f64> {
+fn row(rig: &Rig, name: &str, shape: &[f64], at: &OperatingPoint) -> Vec<f64> {
     let (effect, shape) = (by_name(name).unwrap(), shape.to_vec());
     let mut row = vec![0.0; effect.width(rig, &shape)];
     effect.row(rig, &shape, at, &mut row);

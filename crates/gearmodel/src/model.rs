@@ -67,7 +67,7 @@ impl NominalModel {
     /// What the documented effects add to the errors' TE, rad.
     #[must_use]
     pub fn effects_te_rad(&self, theta1_rad: f64, under: &Condition) -> f64 {
-        self.effects.rig().map_or(0.0, |rig| self.effects.te_rad(&under.station(rig, theta1_rad)))
+        self.effects.rig().map_or(0.0, |rig| self.effects.te_rad(&under.operating_point(rig, theta1_rad)))
     }
 
     /// TE of the errors alone, without documented effects, where the kinematics are at hand already.

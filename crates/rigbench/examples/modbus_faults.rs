@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, ExitCode, Stdio};
 
 use clap::{Parser, ValueEnum};
-use rigbench::trial::{self, Brake, Counting, Device, Servo, Tally, Timing, Workload};
+use rigbench::bus_stress::{self, Brake, Counting, Device, Servo, Tally, Timing, Workload};
 use rigd::link::Link;
 use rigsim::pty::Terminal;
 use tokio::task::LocalSet;
@@ -101,7 +101,7 @@ fn emulated(args: &Args, device: impl Device + 'static) -> Result<Tally, Failure
     LocalSet::new().block_on(&runtime, async {
         let work = device.workload();
         let (mut cable, end) = if simulated { pipe() } else { pty()? };
-        tokio::task::spawn_local(trial::serve(end, device));
+        tokio::task::spawn_local(bus_stress::serve(end, device));
         let connect = || if simulated { Ok(pipe()) } else { pty() };
         Ok(drive(args, timing, &work, &mut cable, connect).await?)
     })
@@ -115,7 +115,7 @@ async fn drive(
     connect: impl FnMut() -> std::io::Result<(Link, Link)>,
 ) -> std::io::Result<Tally> {
     let plan = timing.faults(args.seed, args.share);
-    trial::run(args.transactions, work, plan, args.seed, cable, connect, |link| timing.master(link, work)).await
+    bus_stress::run(args.transactions, work, plan, args.seed, cable, connect, |link| timing.master(link, work)).await
 }
 
 /// A process that ends with the trial.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Duration;
 
-use rigbench::trial::{Device, Servo as EmulatedDrive, Workload, serve};
+use rigbench::bus_stress::{Device, Servo as EmulatedDrive, Workload, serve};
 use rigd::device::mapped_servo::open;
 use rigd::device::{DeviceError, Servo};
 use rigd::link::Address;

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use rigbench::bus_stress::{self, Brake, Counting, Device, Master, Servo, Tally, Timing, Told, Workload};
 use rigbench::proxy::{Fault, FaultPlan};
-use rigbench::trial::{self, Brake, Counting, Device, Master, Servo, Tally, Timing, Told, Workload};
 use rigd::device::bus::BusStatistics;
 use rigd::link::{Duplex, Link};
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
@@ -27,8 +27,8 @@ fn in_simulated_time<M: Master>(
     LocalSet::new().block_on(&runtime, async {
         let work = device.workload();
         let (mut cable, end) = pipe();
-        tokio::task::spawn_local(trial::serve(end, device));
-        trial::run(transactions, &work, plan, 1, &mut cable, || Ok(pipe()), |link| master(link, &work))
+        tokio::task::spawn_local(bus_stress::serve(end, device));
+        bus_stress::run(transactions, &work, plan, 1, &mut cable, || Ok(pipe()), |link| master(link, &work))
             .await
             .expect("a cable")
     })
@@ -187,7 +187,7 @@ fn no_value_of_pymodbus_is_silently_wrong() {
             Ok((Box::new(near) as Link, Box::new(far) as Link))
         };
         let plan = timing.faults(1, 0.15);
-        trial::run(300, &work, plan, 1, &mut cable, pty, |link| timing.master(link, &work)).await.unwrap()
+        bus_stress::run(300, &work, plan, 1, &mut cable, pty, |link| timing.master(link, &work)).await.unwrap()
     });
     println!("{tally:?}");
     assert_eq!(tally.silently_wrong, 0, "{:#?}", tally.examples);

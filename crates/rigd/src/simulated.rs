@@ -15,8 +15,8 @@ pub use rigsim::plant::PlantSpec;
 use rigsim::plant::undocumented::{OUTSIDE, UNDOCUMENTED, find};
 use rigsim::pty::Terminal;
 use rigsim::shaft_record::ShaftRecord;
+use rigsim::simulated_rig::{self, SimulatedRig};
 use rigsim::starter::Starter;
-use rigsim::world::{self, World};
 use rigsim::{commands, serve};
 use thiserror::Error;
 use wire::modbus::LineSettings;
@@ -103,12 +103,12 @@ pub fn mount_discs(spec: &mut PlantSpec, profile: &Profile) {
 /// # Errors
 /// [`SimError`] when the plant cannot be built.
 pub fn start_in_process(spec: &PlantSpec, rate_hz: f64, seed: u64) -> Result<Links, SimError> {
-    Ok(links_to(&Rc::new(RefCell::new(World::new(spec, rate_hz, seed)?))))
+    Ok(links_to(&Rc::new(RefCell::new(SimulatedRig::new(spec, rate_hz, seed)?))))
 }
 
 /// Links to a world within this process; a device that the world says is unplugged hangs up and cannot be dialled.
 #[must_use]
-pub fn links_to(world: &Rc<RefCell<World>>) -> Links {
+pub fn links_to(world: &Rc<RefCell<SimulatedRig>>) -> Links {
     let shared = Rc::clone(world);
     let dial = move |part: DeviceKind| -> Option<Link> {
         let (ours, device) = tokio::io::duplex(PIPE_BYTES);
@@ -191,7 +191,7 @@ pub async fn serve_ptys(
     let starter = Starter::look();
     let io = |what: String| move |source| SimError::Io { what, source };
     let directory = directory.canonicalize().map_err(io(format!("directory {}", directory.display())))?;
-    let world = Rc::new(RefCell::new(World::new(spec, world::IDLE_RATE_HZ, seed)?));
+    let world = Rc::new(RefCell::new(SimulatedRig::new(spec, simulated_rig::IDLE_RATE_HZ, seed)?));
     if let Some(path) = &extras.record {
         let record = ShaftRecord::create(path).map_err(io(format!("--record {}", path.display())))?;
         world.borrow_mut().keep_record(record);

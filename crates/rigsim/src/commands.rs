@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use tokio::sync::mpsc::unbounded_channel;
 
-use super::world::World;
+use super::simulated_rig::SimulatedRig;
 
 /// A thing to do to the rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +45,7 @@ impl Command {
     }
 
     /// Does it.
-    pub fn perform(self, world: &mut World) {
+    pub fn perform(self, world: &mut SimulatedRig) {
         match self {
             Self::EmergencyStop(pressed) => world.press_emergency_stop(pressed),
             Self::Heat(by_c) => world.heat_brake_by(by_c),
@@ -58,7 +58,7 @@ impl Command {
 }
 
 /// Listens to standard input from now on; needs a local task set.
-pub fn listen(world: &Rc<RefCell<World>>) {
+pub fn listen(world: &Rc<RefCell<SimulatedRig>>) {
     let (sender, mut lines) = unbounded_channel();
     // A thread, for reading a terminal cannot be waited for; it ends with the input or with the process.
     std::thread::spawn(move || {

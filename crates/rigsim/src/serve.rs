@@ -9,31 +9,31 @@ use tokio::time::{Instant, sleep_until, timeout};
 use wire::modbus::{LineSettings, Request, frame_time, inter_frame_silence};
 
 use super::emulator::{ModbusLine, Reply};
-use super::world::World;
+use super::simulated_rig::SimulatedRig;
 
 /// A Modbus slave of the world: its place on its line, and who answers.
 pub struct Slave {
     unit: u8,
     line: LineSettings,
-    handle: fn(&mut World, &Request) -> Reply,
+    handle: fn(&mut SimulatedRig, &Request) -> Reply,
 }
 
 impl Slave {
     /// The servo drive.
     #[must_use]
     pub fn servo(unit: u8, line: LineSettings) -> Self {
-        Self { unit, line, handle: World::ask_servo }
+        Self { unit, line, handle: SimulatedRig::ask_servo }
     }
 
     /// The brake's current source.
     #[must_use]
     pub fn brake(unit: u8, line: LineSettings) -> Self {
-        Self { unit, line, handle: World::ask_brake }
+        Self { unit, line, handle: SimulatedRig::ask_brake }
     }
 }
 
 /// Serves a Modbus slave until its line is closed.
-pub async fn modbus(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<World>>, slave: Slave) {
+pub async fn modbus(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<SimulatedRig>>, slave: Slave) {
     let mut protocol = ModbusLine::new();
     let mut buffer = [0; 512];
     let silence = inter_frame_silence(slave.line.baud);
@@ -79,7 +79,7 @@ pub async fn modbus(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<Ref
 const BLOCKED: Duration = Duration::from_millis(5);
 
 /// Serves the counter box until its line is closed.
-pub async fn counter(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<World>>) {
+pub async fn counter(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<SimulatedRig>>) {
     let mut bytes = Vec::new();
     let mut sent = 0;
     let mut buffer = [0; 512];
@@ -117,7 +117,7 @@ pub async fn counter(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<Re
 const READER_PERIOD: Duration = Duration::from_millis(2);
 
 /// Serves a QSB reader until its line is closed; what a full line does not take is lost.
-pub async fn reader(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<World>>, which: usize) {
+pub async fn reader(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<SimulatedRig>>, which: usize) {
     let mut buffer = [0; 512];
     let mut bytes = Vec::new();
     loop {

@@ -27,7 +27,7 @@ pub(super) fn headline(diagnosis: &Diagnosis) -> String {
     let items: Vec<String> = causes.into_iter().map(words::item).collect();
     let mut text = match items.as_slice() {
         [] => summary::unexplained(diagnosis).to_owned(),
-        [one] => format!("Cause: {one}"),
+        [one] => format!("Candidate: {one}"),
         many => format!("{} causes: {}", many.len(), many.join("; ")),
     };
     if small > 0 {

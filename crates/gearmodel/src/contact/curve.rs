@@ -32,7 +32,7 @@ const SETTLED_MM: f64 = 1e-7;
 /// Largest difference between a panel and the contact solved within it, rad.
 const CHECK_RAD: f64 = 1e-11;
 
-/// A stretch of θ1 on which one lead carries.
+/// A segment of θ1 on which one lead carries.
 struct Piece {
     start_rad: f64,
     end_rad: f64,
@@ -167,7 +167,7 @@ impl<'a> Curve<'a> {
         Ok(te_rad)
     }
 
-    /// Adds the pieces of a stretch of θ1.
+    /// Adds the pieces of a segment of θ1.
     fn add(&mut self, start_rad: f64, end_rad: f64, halvings: u32) {
         let half_width_rad = 0.5 * (end_rad - start_rad);
         let middle_rad = start_rad + half_width_rad;
@@ -324,7 +324,7 @@ impl<'a> Curve<'a> {
     }
 }
 
-/// How many angles, the first whatever it is, lie in one stretch before one that does not.
+/// How many angles, the first whatever it is, lie in one segment before one that does not.
 fn run(theta1_rad: &[f64], start_rad: f64, end_rad: f64) -> usize {
     theta1_rad.iter().skip(1).take_while(|theta| start_rad <= **theta && **theta < end_rad).count() + 1
 }

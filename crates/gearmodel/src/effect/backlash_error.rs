@@ -1,7 +1,7 @@
 //! Tooth thinning differs from the designed backlash by dj along the pitch curve:
 //! TE = −dir·(dj/2) cos α/A.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
 
 /// Tooth thinning differs from the designed backlash by dj along the pitch curve.
 pub(super) struct BacklashError;
@@ -23,7 +23,7 @@ impl Effect for BacklashError {
         true
     }
 
-    fn row(&self, rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense * 0.5 * rig.pair().pressure_angle_rad().cos() / at.arm_mm;
     }
 

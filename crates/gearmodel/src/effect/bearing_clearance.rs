@@ -1,7 +1,7 @@
 //! Bearings with play: the load pushes the gear aside by c along the common normal, TE = −dir·c/A, whatever its size.
 //! The same trace as a backlash error of 2c/cos α.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
 
 /// Bearings with play.
 pub(super) struct BearingClearance;
@@ -27,7 +27,7 @@ impl Effect for BearingClearance {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense / at.arm_mm;
     }
 

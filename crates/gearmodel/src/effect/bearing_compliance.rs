@@ -1,7 +1,7 @@
 //! Bearings give way along the common normal, c mm a newton: with the tooth force F = 1000 T/A (T in N·m, A in mm),
 //! TE = −dir·1000 T c/A².
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
 
 /// Bearings give way along the common normal, c mm a newton.
 pub(super) struct BearingCompliance;
@@ -23,7 +23,7 @@ impl Effect for BearingCompliance {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense * 1000.0 * at.load_nm / (at.arm_mm * at.arm_mm);
     }
 

@@ -2,7 +2,8 @@
 //! TE = −dir·T·C(θ1)·ρ sin(nθ2 − φ), C the documented compliance of the train. The shape is [n].
 
 use super::{
-    Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shaft, Shape, Signature, StatedError, Station,
+    Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shaft, Shape, Signature,
+    StatedError,
 };
 
 /// Torque ripple of the brake.
@@ -40,7 +41,7 @@ impl Effect for BrakeTorqueRipple {
         Some((Shaft::Output, *shape.first()?))
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let [order] = shape[..] else { return };
         let windup_rad = -at.sense * at.load_nm * rig.train_compliance_rad_per_nm(at);
         let (sin, cos) = (order * at.theta2_rad).sin_cos();

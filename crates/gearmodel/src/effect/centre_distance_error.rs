@@ -1,7 +1,7 @@
 //! Centre distance grown by Δa against the documented one: gear 1 moves by (−Δa, 0) against gear 2,
 //! TE = −dir·Δa tan(α ∓ μ)/r2.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
 
 /// Centre distance grown by Δa against the documented one.
 pub(super) struct CentreDistanceError;
@@ -28,7 +28,7 @@ impl Effect for CentreDistanceError {
         }
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense * at.pressure_rad.tan() / at.r2_mm;
     }
 

@@ -8,8 +8,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
-    StatedEffect, StatedError, Station,
+    Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
+    Stated, StatedEffect, StatedError,
 };
 
 /// Stands for steps spread evenly over the way; times are not negative.
@@ -50,7 +50,7 @@ impl Effect for CountLoss {
         if plan.revolutions > LEAST_WAY_REV { vec![vec![RAMP]] } else { Vec::new() }
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = if shape[..] == [RAMP] { at.way_rev } else { steps_so_far(shape, at.time_s) };
     }
 

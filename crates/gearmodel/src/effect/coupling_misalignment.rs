@@ -2,7 +2,7 @@
 //! In the output shaft the encoder reads θ2 + (β²/4) sin(2θ2 − φ); in the input shaft gear 1 stands at θ1 + (β²/4) sin(2θ1 − φ),
 //! seen as i times that.
 
-use super::{Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
+use super::{Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError};
 
 /// Misalignment of the coupling in the input or output shaft.
 pub(super) struct CouplingMisalignment(pub(super) Shaft);
@@ -34,7 +34,7 @@ impl Effect for CouplingMisalignment {
         2
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         at.wave(self.0, 2.0, if self.0 == Shaft::Input { at.ratio } else { 1.0 }, row);
     }
 

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Effect, Given, LIBRARY, Rig, Shaft, Shape, StatedEffect, StatedError, Station, by_name};
+use super::{Effect, Given, LIBRARY, OperatingPoint, Rig, Shaft, Shape, StatedEffect, StatedError, by_name};
 use crate::{Errors, GearPair, GeometryError, NominalModel};
 
 /// An effect with its shape and amplitudes.
@@ -60,7 +60,7 @@ impl Term {
 
     /// TE at a station, rad: columns · β.
     #[must_use]
-    pub fn te_rad(&self, rig: &Rig, at: &Station) -> f64 {
+    pub fn te_rad(&self, rig: &Rig, at: &OperatingPoint) -> f64 {
         let mut row = vec![0.0; self.beta.len()];
         self.effect.row(rig, &self.shape, at, &mut row);
         row.iter().zip(&self.beta).map(|(x, b)| x * b).sum()
@@ -176,7 +176,7 @@ impl Documented {
 
     /// TE that they add at a station of [`Documented::rig`], rad.
     #[must_use]
-    pub fn te_rad(&self, at: &Station) -> f64 {
+    pub fn te_rad(&self, at: &OperatingPoint) -> f64 {
         self.0.as_ref().map_or(0.0, |inner| inner.terms.iter().map(|term| term.te_rad(&inner.rig, at)).sum())
     }
 }

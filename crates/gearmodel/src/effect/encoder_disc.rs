@@ -2,7 +2,7 @@
 //! θ + eps sin(nθ − φ) to first order. Seen in TE as −i eps sin(nθ1 − φ) for the input encoder, eps sin(nθ2 − φ) for the output
 //! encoder.
 
-use super::{Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
+use super::{Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError};
 
 /// Order 1 or 2 of the input or output encoder's disc.
 pub(super) struct EncoderDisc {
@@ -46,7 +46,7 @@ impl Effect for EncoderDisc {
         2
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         at.reading_error(self.shaft, f64::from(self.order as u8), row);
     }
 

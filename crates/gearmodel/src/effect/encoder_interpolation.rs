@@ -2,7 +2,9 @@
 //! unequal amplitudes or quadrature: order 2), reading θ + a sin(h·L·θ − φ). Averaging over angle bins hides it; it is found
 //! on the samples (`gap::line_phase`). The shape is [order h, lines L].
 
-use super::{Carrier, Effect, Estimate, Given, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Station};
+use super::{
+    Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError,
+};
 
 /// Names by encoder: these effects are found on the samples, not on the places.
 pub const NAMES: [&str; 2] = ["encoder1_interpolation", "encoder2_interpolation"];
@@ -39,7 +41,7 @@ impl Effect for EncoderInterpolation {
         2
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         if let [order, lines] = shape[..] {
             at.reading_error(self.0, order * lines, row);
         }

@@ -1,7 +1,7 @@
 //! Drag of seals and bearings winds the shafts up beside the load: TE = −dir·M·[C_out + C_in i² + C_mesh/A²] with the
 //! documented compliances, or at 1 rad/(N·m) where there are none.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
 
 /// Drag of seals and bearings winds the shafts up beside the load.
 pub(super) struct FrictionWindup;
@@ -27,7 +27,7 @@ impl Effect for FrictionWindup {
         true
     }
 
-    fn row(&self, rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense * rig.train_compliance_rad_per_nm(at);
     }
 

@@ -3,7 +3,7 @@
 //! By the increment along the common normal, with a = dir·(α ∓ μ) (`increment::common_normal`):
 //! TE = [dx sin(θ1 + a) + dy cos(θ1 + a)]/A for gear 1, [dx sin(θ2 − a) + dy cos(θ2 − a)]/A for gear 2.
 
-use super::{Effect, Estimate, Fold, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+use super::{Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature};
 
 /// Eccentricity of gear 1 (input) or gear 2 (output) against the documented one.
 pub(super) struct GearEccentricity(pub(super) Shaft);
@@ -31,7 +31,7 @@ impl Effect for GearEccentricity {
         2
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let lean = at.sense * at.pressure_rad;
         let angle = match self.0 {
             Shaft::Input => at.theta1_rad + lean,

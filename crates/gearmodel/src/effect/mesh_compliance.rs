@@ -1,6 +1,6 @@
 //! The teeth give way along the common normal: TE = −dir·T·C/A².
 
-use super::{Carrier, Effect, Estimate, Fold, Parameter, Parity, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
 
 /// The teeth give way along the common normal.
 pub(super) struct MeshCompliance;
@@ -22,7 +22,7 @@ impl Effect for MeshCompliance {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense * at.load_nm / (at.arm_mm * at.arm_mm);
     }
 

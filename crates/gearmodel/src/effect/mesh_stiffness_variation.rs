@@ -1,10 +1,10 @@
 //! With two tooth pairs in contact the mesh is stiffer than with one: TE = −dir·T·C·w(u)/A² with w = 1 − duty where one pair
 //! carries and −duty elsewhere, zero in the mean over a pitch. `duty` is the share of a pitch on one pair. Shape [duty, start]:
-//! the stretch on one pair begins at u = start. The empty shape takes the stretches from the tips of the documented teeth.
+//! the segment on one pair begins at u = start. The empty shape takes the segments from the tips of the documented teeth.
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
-    StatedError, Station, stated,
+    Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
+    StatedEffect, StatedError, stated,
 };
 
 /// Variation of the mesh compliance over the pitch.
@@ -56,7 +56,7 @@ impl Effect for MeshStiffnessVariation {
         Grain::Sharp
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let weight = if let [duty, start] = shape[..] {
             let from_start = at.pitches - start;
             if from_start - from_start.floor() < duty { 1.0 - duty } else { -duty }
@@ -81,7 +81,7 @@ impl Effect for MeshStiffnessVariation {
     fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let shape = if given.has("duty") {
             let duty = given.number_in("duty", 0.0, 1.0)?;
-            // Where nothing else is said the stretch on one pair lies about the pitch point.
+            // Where nothing else is said the segment on one pair lies about the pitch point.
             vec![duty, given.number_or("start_pitches", -0.5 * duty)?]
         } else {
             Shape::new()

@@ -1,6 +1,6 @@
 //! The effects that may stand between the nominal model and the rig, each linearised about the nominal pair.
 //!
-//! An effect is a block of columns over the samples' [`Station`]s: its trace is columns · β, with amplitudes β in the
+//! An effect is a block of columns over the samples' [`OperatingPoint`]s: its trace is columns · β, with amplitudes β in the
 //! effect's own units and, where the trace is not linear in a parameter, a [`Shape`] that the diagnosis searches on a grid. One
 //! effect = one file + one line in [`LIBRARY`]. Equations stand in the files; common symbols:
 //!
@@ -26,6 +26,7 @@ mod friction_windup;
 mod gear_eccentricity;
 mod mesh_compliance;
 mod mesh_stiffness_variation;
+mod operating_point;
 mod phasing_error;
 mod pitch_curve_error;
 mod pitch_errors;
@@ -37,7 +38,6 @@ mod shaft_compliance;
 mod signature;
 mod slip;
 mod stated;
-mod station;
 mod thermal_drift;
 mod time_skew;
 mod tooth_damage;
@@ -45,11 +45,11 @@ mod torsional_resonance;
 mod wear_drift;
 
 pub use documented::{Documented, Fold, Term};
+pub use operating_point::{Grain, MOST_LOADS, OperatingPoint, Plan, RevolutionsByLoad};
 pub use polar::Estimate;
 pub use rig::{MeshOrders, Rig};
 pub use signature::{Accumulates, Carrier, Parity, Signature};
 pub use stated::{Given, Stated, StatedEffect, StatedError};
-pub use station::{Grain, LEDGER_LOADS, Ledger, Plan, Station};
 
 pub use encoder_interpolation::NAMES as INTERPOLATION;
 
@@ -117,7 +117,7 @@ impl Parameter {
 }
 
 /// Writes the row of a station.
-pub type Rows<'a> = Box<dyn FnMut(&Station, &mut [f64]) + 'a>;
+pub type Rows<'a> = Box<dyn FnMut(&OperatingPoint, &mut [f64]) + 'a>;
 
 /// An effect of the library.
 pub trait Effect: Sync {
@@ -161,7 +161,7 @@ pub trait Effect: Sync {
     }
 
     /// Trace per unit amplitude at a station, rad; `row` has `width` entries, all zero on entry.
-    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]);
+    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]);
 
     /// [`Effect::row`] for station after station, with what they share worked out once.
     fn rows<'a>(&'a self, rig: &'a Rig, shape: &'a Shape) -> Rows<'a> {

@@ -1,6 +1,6 @@
 //! Gear 1 is clocked by δ against its encoder's index: it stands at θ1 + δ, TE = f(θ1 + δ) − f(θ1) = i δ.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
 
 /// Gear 1 is clocked by δ against its encoder's index.
 pub(super) struct PhasingError;
@@ -22,7 +22,7 @@ impl Effect for PhasingError {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = at.ratio;
     }
 

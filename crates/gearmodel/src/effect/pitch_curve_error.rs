@@ -3,8 +3,8 @@
 //! otherwise (a wrong ratio), TE = dk·θ1, which grows with every revolution and returns when the sense turns.
 
 use super::{
-    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
-    StatedEffect, StatedError, Station, stated,
+    Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
+    Stated, StatedEffect, StatedError, stated,
 };
 
 /// Error of the pitch curves' form or closure.
@@ -47,7 +47,7 @@ impl Effect for PitchCurveError {
         shapes
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = if shape[..] == [1.0] { at.theta1_rad } else { rig.theta2_slope_over_k(at.theta2_rad).unwrap_or(0.0) };
     }
 

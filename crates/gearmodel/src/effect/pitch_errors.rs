@@ -10,7 +10,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Rig, Shape, Signature, StatedError, Station, Value,
+    Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, StatedError,
+    Value,
 };
 
 /// Pitch errors of the driver's teeth, flank by flank.
@@ -98,7 +99,7 @@ impl Effect for PitchErrors {
         (&["backlash_error", "bearing_clearance", "centre_distance_error"], 0.4)
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let teeth = teeth(rig);
         let side = usize::from(at.sense < 0.0);
         let waves = teeth - 1;

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Effect, Estimate, Ledger, Rig, Shape, Station};
+use super::{Effect, Estimate, OperatingPoint, RevolutionsByLoad, Rig, Shape};
 use crate::Direction;
 
 /// A found effect with its amplitudes.
@@ -50,19 +50,19 @@ impl Condition {
 
     /// The station at θ1; the revolutions so far were made under this load and in this sense.
     #[must_use]
-    pub fn station(&self, rig: &Rig, theta1_rad: f64) -> Station {
+    pub fn operating_point(&self, rig: &Rig, theta1_rad: f64) -> OperatingPoint {
         let sense = self.direction.sign();
-        let mut ledger = Ledger::default();
-        ledger.load_nm[0] = self.load_nm;
-        ledger.signed_rev[0] = sense * self.revolutions;
-        ledger.way_rev[0] = self.revolutions;
-        Station {
+        let mut revolutions_by_load = RevolutionsByLoad::default();
+        revolutions_by_load.load_nm[0] = self.load_nm;
+        revolutions_by_load.signed_rev[0] = sense * self.revolutions;
+        revolutions_by_load.way_rev[0] = self.revolutions;
+        OperatingPoint {
             load_nm: self.load_nm,
             speed_rad_per_s: sense * self.speed_rpm * std::f64::consts::TAU / 60.0,
             time_s: self.time_s,
             way_rev: self.revolutions,
-            ledger,
-            ..rig.station(theta1_rad, rig.pair().theta2(theta1_rad), self.direction)
+            revolutions_by_load,
+            ..rig.operating_point(theta1_rad, rig.pair().theta2(theta1_rad), self.direction)
         }
     }
 }
@@ -81,7 +81,7 @@ impl Found {
     #[must_use]
     pub fn te_rad(&self, theta1_rad: f64, at: &Condition) -> (f64, f64) {
         let Some(rig) = &self.rig else { return (0.0, 0.0) };
-        let station = at.station(rig, theta1_rad);
+        let station = at.operating_point(rig, theta1_rad);
         let (mut te_rad, mut variance) = (0.0, 0.0);
         for found in &self.effects {
             let (te, var) = found.te(rig, &station);
@@ -93,7 +93,7 @@ impl Found {
 }
 
 impl FoundEffect {
-    fn te(&self, rig: &Rig, station: &Station) -> (f64, f64) {
+    fn te(&self, rig: &Rig, station: &OperatingPoint) -> (f64, f64) {
         let mut row = vec![0.0; self.estimate.beta.len()];
         self.effect.row(rig, &self.shape, station, &mut row);
         let te: f64 = row.iter().zip(&self.estimate.beta).map(|(x, b)| x * b).sum();

@@ -7,8 +7,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Plan, Rig, Shape, Signature, Stated, StatedEffect,
-    StatedError, Station,
+    Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
+    StatedEffect, StatedError,
 };
 
 /// Profile deviation by mesh orders.
@@ -67,7 +67,7 @@ impl Effect for ProfileError {
         Grain::Fine
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let first = if shape[..] == [A_FLANK] && at.sense < 0.0 { 2 * ORDERS } else { 0 };
         // `pitches` counts from each flank's own tooth 0: the cw flank's passes half a pitch later.
         let from_ccw = if shape[..] == [OWN_ZERO] || at.sense > 0.0 { 0.0 } else { 0.5 };

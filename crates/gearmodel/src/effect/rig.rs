@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::Station;
+use super::OperatingPoint;
 use crate::contact::ContactModel;
 use crate::increment::common_normal;
 use crate::pitch_curve::AnyCurve;
@@ -106,7 +106,7 @@ impl Rig {
 
     /// Fills in what follows from angle and sense.
     #[must_use]
-    pub fn station(&self, theta1_rad: f64, theta2_rad: f64, direction: Direction) -> Station {
+    pub fn operating_point(&self, theta1_rad: f64, theta2_rad: f64, direction: Direction) -> OperatingPoint {
         let at = self.pair().at(theta1_rad);
         let sense = direction.sign();
         let pressure_rad = common_normal::effective_pressure_angle_rad(self.pair(), &at, direction);
@@ -116,7 +116,7 @@ impl Rig {
         } else {
             0.0
         };
-        Station {
+        OperatingPoint {
             theta1_rad,
             theta2_rad,
             sense,
@@ -126,13 +126,13 @@ impl Rig {
             arm_mm: at.r2_mm * pressure_rad.cos(),
             pitches,
             pitches_per_rad: if self.pair().has_teeth() { at.r1_mm / (at.mu_rad.cos() * self.pitch_mm) } else { 0.0 },
-            ..Station::default()
+            ..OperatingPoint::default()
         }
     }
 
     /// Driver teeth in contact where tips reach as far as `reach` says: 0 for the nominal tips, 1 for those of a rack, the longest
     /// there are, less than 0 for tips that are relieved.
-    pub fn teeth_in_contact(&self, at: &Station, reach: f64) -> impl Iterator<Item = usize> + '_ {
+    pub fn teeth_in_contact(&self, at: &OperatingPoint, reach: f64) -> impl Iterator<Item = usize> + '_ {
         // A rack's contact point stands u·π m cos α sin α from the pitch line.
         let (sin, cos) = self.pair().pressure_angle_rad().sin_cos();
         let of_rack = self.pair().addendum() / (PI * cos * sin);
@@ -149,7 +149,7 @@ impl Rig {
 
     /// Share of the pitch about a station on which one pair alone carries: two less the contact ratio.
     #[must_use]
-    pub fn single_pair_duty(&self, at: &Station) -> f64 {
+    pub fn single_pair_duty(&self, at: &OperatingPoint) -> f64 {
         let spans = &self.spans[usize::from(at.sense < 0.0)];
         let nearest = (at.pitches.round() as i64).checked_rem_euclid(spans.len() as i64);
         nearest.and_then(|n| spans.get(n as usize)).map_or(0.0, Span::single_pair_duty)
@@ -165,7 +165,7 @@ impl Rig {
     /// Compliance of the whole train at the driven encoder, rad/(N·m): C_out + C_in i² + C_mesh/A²; 1 rad/(N·m) at the output
     /// where none is documented.
     #[must_use]
-    pub fn train_compliance_rad_per_nm(&self, at: &Station) -> f64 {
+    pub fn train_compliance_rad_per_nm(&self, at: &OperatingPoint) -> f64 {
         let Errors {
             shaft_compliance_output_rad_per_nm: output,
             shaft_compliance_input_rad_per_nm: input,
@@ -179,7 +179,7 @@ impl Rig {
     }
 }
 
-/// A stretch of contact, pitches from the pitch point.
+/// A segment of contact, pitches from the pitch point.
 #[derive(Clone, Copy, Debug, Default)]
 struct Span {
     from: f64,

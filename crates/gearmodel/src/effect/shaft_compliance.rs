@@ -1,7 +1,7 @@
 //! A shaft is softer than documented: the load winds it up, TE = −dir·T·C for the output shaft, −dir·T·C i² for the input
 //! shaft, whose torque is T i and whose twist is seen through the ratio.
 
-use super::{Carrier, Effect, Estimate, Fold, Parameter, Parity, Rig, Shaft, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature};
 
 /// Compliance of the input or output shaft beyond the documented one.
 pub(super) struct ShaftCompliance(pub(super) Shaft);
@@ -34,7 +34,7 @@ impl Effect for ShaftCompliance {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let seen = if self.0 == Shaft::Input { at.ratio * at.ratio } else { 1.0 };
         row[0] = -at.sense * at.load_nm * seen;
     }

@@ -2,7 +2,8 @@
 //! TE = −k Σ dir·max(0, T − t0)·revolutions. The shape is [t0].
 
 use super::{
-    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station,
+    Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
+    StatedError,
 };
 
 /// Slip of a clamp or coupling.
@@ -50,13 +51,13 @@ impl Effect for Slip {
         true
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let [threshold_nm] = shape[..] else { return };
-        let ledger = &at.ledger;
-        row[0] = -ledger
+        let revolutions_by_load = &at.revolutions_by_load;
+        row[0] = -revolutions_by_load
             .load_nm
             .iter()
-            .zip(&ledger.signed_rev)
+            .zip(&revolutions_by_load.signed_rev)
             .map(|(load, rev)| (load - threshold_nm).max(0.0) * rev)
             .sum::<f64>();
     }

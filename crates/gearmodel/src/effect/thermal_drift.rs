@@ -2,7 +2,8 @@
 //! TE = −dir·Δa(t) tan(α ∓ μ)/r2. The shape is [τ].
 
 use super::{
-    Accumulates, Carrier, Effect, Estimate, Given, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station,
+    Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
+    StatedError,
 };
 
 /// Thermal growth of the centre distance.
@@ -43,7 +44,7 @@ impl Effect for ThermalDrift {
         true
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let [tau_s] = shape[..] else { return };
         row[0] = at.sense * at.pressure_rad.tan() / at.r2_mm * (-at.time_s / tau_s).exp_m1();
     }

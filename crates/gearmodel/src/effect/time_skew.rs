@@ -1,6 +1,6 @@
 //! θ2 was read dt later than θ1, and by then has moved on: TE = dt·dθ2/dt = dt·i·dθ1/dt.
 
-use super::{Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
 
 /// θ2 was read dt later than θ1, and by then has moved on.
 pub(super) struct TimeSkew;
@@ -22,7 +22,7 @@ impl Effect for TimeSkew {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = at.ratio * at.speed_rad_per_s;
     }
 

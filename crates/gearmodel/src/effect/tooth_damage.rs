@@ -4,8 +4,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, Parameter, Parity, Plan, Rig, Shape, Signature, StatedError, Station,
-    Value,
+    Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
+    StatedError, Value,
 };
 
 /// One damaged tooth flank.
@@ -60,7 +60,7 @@ impl Effect for ToothDamage {
         Grain::Fine
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let [tooth, flank, width] = shape[..] else { return };
         if flank * at.sense < 0.0 {
             return;

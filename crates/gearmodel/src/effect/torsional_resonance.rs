@@ -15,8 +15,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, MeshOrders, Parameter, Parity, Plan, Rig, Rows, Shape, Signature, Stated,
-    StatedEffect, StatedError, Station, stated,
+    Carrier, Effect, Estimate, Given, Grain, MeshOrders, OperatingPoint, Parameter, Parity, Plan, Rig, Rows, Shape,
+    Signature, Stated, StatedEffect, StatedError, stated,
 };
 
 /// What excites it, as a file states it, and the kind that it is.
@@ -203,7 +203,7 @@ impl Effect for TorsionalResonance {
         if shape.first() == Some(&MESH) { Grain::Fine } else { Grain::Smooth }
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &Station, row: &mut [f64]) {
+    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         self.rows(rig, shape)(at, row);
     }
 
@@ -213,7 +213,7 @@ impl Effect for TorsionalResonance {
         let orders = rig.mesh_orders();
         // Amplitudes of the orders change with the speed only, which a run keeps.
         let mut last: Option<(f64, Vec<[f64; 2]>)> = None;
-        let mut sum = move |first: i32, at: &Station, amplitudes: &dyn Fn(f64) -> Vec<[f64; 2]>| {
+        let mut sum = move |first: i32, at: &OperatingPoint, amplitudes: &dyn Fn(f64) -> Vec<[f64; 2]>| {
             let hz = at.speed_rad_per_s / TAU;
             if last.as_ref().is_none_or(|(of, _)| *of != hz) {
                 last = None;

@@ -1,6 +1,6 @@
 //! Teeth wear, so that backlash grows with revolutions × load: dj = w Σ T·revolutions, TE = −dir·(dj/2) cos α/A.
 
-use super::{Accumulates, Carrier, Effect, Estimate, Parameter, Parity, Rig, Shape, Signature, Station};
+use super::{Accumulates, Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
 
 /// Teeth wear, so that backlash grows with revolutions × load.
 pub(super) struct WearDrift;
@@ -26,8 +26,14 @@ impl Effect for WearDrift {
         true
     }
 
-    fn row(&self, rig: &Rig, _shape: &Shape, at: &Station, row: &mut [f64]) {
-        let work_rev_nm: f64 = at.ledger.load_nm.iter().zip(&at.ledger.way_rev).map(|(load, way)| load * way).sum();
+    fn row(&self, rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+        let work_rev_nm: f64 = at
+            .revolutions_by_load
+            .load_nm
+            .iter()
+            .zip(&at.revolutions_by_load.way_rev)
+            .map(|(load, way)| load * way)
+            .sum();
         row[0] = -at.sense * 0.5 * rig.pair().pressure_angle_rad().cos() * work_rev_nm / at.arm_mm;
     }
 

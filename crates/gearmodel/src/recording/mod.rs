@@ -14,7 +14,7 @@ use crate::measure::{AngleGrid, RunConditions, RunTe};
 use crate::{Direction, GearPair};
 
 pub use check::RecordingError;
-pub use split::{REVERSAL_RAD, Stretch, stretches};
+pub use split::{REVERSAL_RAD, Segment, segments};
 
 /// One value for all samples, or one a sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,10 +52,10 @@ impl Condition<'_> {
         }
     }
 
-    fn part(&self, stretch: Stretch) -> Condition<'_> {
+    fn part(&self, segment: Segment) -> Condition<'_> {
         match self {
             Self::All(value) => Condition::All(*value),
-            Self::Each(values) => Condition::Each(Cow::Borrowed(&values[stretch.from..stretch.to])),
+            Self::Each(values) => Condition::Each(Cow::Borrowed(&values[segment.from..segment.to])),
         }
     }
 
@@ -216,11 +216,11 @@ impl<'a> Recording<'a> {
     /// Where the recording keeps one sense: whole for a stated direction, else cut where θ1 turns back by more than
     /// [`REVERSAL_RAD`], less what is one gap of θ2. Empty for "auto" without motion.
     #[must_use]
-    pub fn stretches(&self) -> Vec<Stretch> {
+    pub fn segments(&self) -> Vec<Segment> {
         if let Some(direction) = self.columns.direction {
-            return vec![Stretch { from: 0, to: self.samples(), direction }];
+            return vec![Segment { from: 0, to: self.samples(), direction }];
         }
-        let mut found = stretches(&self.columns.theta1_rad);
+        let mut found = segments(&self.columns.theta1_rad);
         found.retain(|part| self.columns.theta2_rad[part.from..part.to].iter().any(|theta| theta.is_finite()));
         found
     }
@@ -228,20 +228,20 @@ impl<'a> Recording<'a> {
     /// The parts of one sense each, in order, with their direction; they borrow the columns.
     #[must_use]
     pub fn split(&self) -> Vec<Recording<'_>> {
-        self.stretches().into_iter().map(|stretch| self.part(stretch)).collect()
+        self.segments().into_iter().map(|segment| self.part(segment)).collect()
     }
 
-    fn part(&self, stretch: Stretch) -> Recording<'_> {
+    fn part(&self, segment: Segment) -> Recording<'_> {
         let columns = &self.columns;
-        let samples = stretch.from..stretch.to;
+        let samples = segment.from..segment.to;
         Recording {
             columns: Columns {
                 time_s: Cow::Borrowed(&columns.time_s[samples.clone()]),
                 theta1_rad: Cow::Borrowed(&columns.theta1_rad[samples.clone()]),
                 theta2_rad: Cow::Borrowed(&columns.theta2_rad[samples]),
-                load_nm: columns.load_nm.part(stretch),
-                speed_rpm: columns.speed_rpm.part(stretch),
-                direction: Some(stretch.direction),
+                load_nm: columns.load_nm.part(segment),
+                speed_rpm: columns.speed_rpm.part(segment),
+                direction: Some(segment.direction),
                 input_lines: columns.input_lines,
                 output_lines: columns.output_lines,
             },
@@ -253,7 +253,7 @@ impl<'a> Recording<'a> {
     /// # Errors
     /// [`RecordingError::Reverses`] and [`RecordingError::Still`] for "auto" with more than one sense, or none.
     pub fn one_sense(&self) -> Result<Direction, RecordingError> {
-        match self.stretches().as_slice() {
+        match self.segments().as_slice() {
             [] => Err(RecordingError::Still { limit_rad: REVERSAL_RAD }),
             [only] => Ok(only.direction),
             [first, rest @ ..] => Err(RecordingError::Reverses { reversals: rest.len(), index: first.to }),

@@ -5,9 +5,9 @@ use crate::Direction;
 /// Way back that makes a reversal, rad: above encoder noise and velocity ripple, below any motion that is meant.
 pub const REVERSAL_RAD: f64 = 0.01;
 
-/// A stretch of one sense: samples `from..to`.
+/// A segment of one sense: samples `from..to`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stretch {
+pub struct Segment {
     /// First sample.
     pub from: usize,
     /// First sample after it.
@@ -22,10 +22,10 @@ type Extremum = Option<(usize, f64)>;
 /// Cuts at the turning points of `theta1_rad` (NaN = gap). Empty where it never moves by more than [`REVERSAL_RAD`].
 ///
 /// A turning point is an extremum from which the angle then comes back by more than [`REVERSAL_RAD`]; the sample of the
-/// extremum begins the new stretch.
+/// extremum begins the new segment.
 #[must_use]
-pub fn stretches(theta1_rad: &[f64]) -> Vec<Stretch> {
-    let mut found: Vec<Stretch> = Vec::new();
+pub fn segments(theta1_rad: &[f64]) -> Vec<Segment> {
+    let mut found: Vec<Segment> = Vec::new();
     let mut from = 0;
     // Lowest and highest sample since the last turning point.
     let (mut low, mut high): (Extremum, Extremum) = (None, None);
@@ -53,7 +53,7 @@ pub fn stretches(theta1_rad: &[f64]) -> Vec<Stretch> {
             }
         };
         if let Some((at, direction)) = turned {
-            found.push(Stretch { from, to: at, direction });
+            found.push(Segment { from, to: at, direction });
             from = at;
             sense = Some(direction.reversed());
             (low, high) = match direction {
@@ -63,7 +63,7 @@ pub fn stretches(theta1_rad: &[f64]) -> Vec<Stretch> {
         }
     }
     if let Some(direction) = sense {
-        found.push(Stretch { from, to: theta1_rad.len(), direction });
+        found.push(Segment { from, to: theta1_rad.len(), direction });
     }
     found
 }
@@ -79,19 +79,19 @@ mod tests {
 
     #[test]
     fn noise_below_the_limit_makes_no_reversal_and_motion_above_it_does() {
-        let directions = |theta: &[f64]| stretches(theta).iter().map(|part| part.direction).collect::<Vec<_>>();
+        let directions = |theta: &[f64]| segments(theta).iter().map(|part| part.direction).collect::<Vec<_>>();
         let there_and_back = [Direction::Ccw, Direction::Cw, Direction::Ccw];
         assert_eq!(directions(&swing(629, 0.0)), there_and_back);
         assert_eq!(directions(&swing(629, 0.9 * REVERSAL_RAD)), there_and_back);
         assert!(directions(&swing(629, 1.5 * REVERSAL_RAD)).len() > 3);
-        assert!(stretches(&[0.0, 0.5 * REVERSAL_RAD, 0.0]).is_empty());
+        assert!(segments(&[0.0, 0.5 * REVERSAL_RAD, 0.0]).is_empty());
     }
 
     #[test]
     fn stretches_cover_every_sample_once_and_meet_at_the_extrema() {
         let mut theta = swing(1000, 0.0);
         theta[300] = f64::NAN;
-        let parts = stretches(&theta);
+        let parts = segments(&theta);
         assert_eq!((parts[0].from, parts[parts.len() - 1].to), (0, 1000));
         assert!(parts.windows(2).all(|pair| pair[0].to == pair[1].from));
         let expected = [157, 471, 785];

@@ -99,7 +99,7 @@ fn a_swing_is_cut_at_its_turning_points_and_each_part_keeps_its_columns() {
         blind.theta2_rad = with(&blind.theta2_rad, sample, f64::NAN);
     }
     blind.theta2_rad = with(&blind.theta2_rad, 157, f64::NAN);
-    let senses: Vec<_> = Recording::new(blind).unwrap().stretches().iter().map(|part| part.direction).collect();
+    let senses: Vec<_> = Recording::new(blind).unwrap().segments().iter().map(|part| part.direction).collect();
     assert_eq!(senses, [Direction::Ccw, Direction::Ccw, Direction::Cw], "a part without theta2 holds nothing");
     let owned = parts[1].clone().into_owned();
     assert_eq!(owned, parts[1]);

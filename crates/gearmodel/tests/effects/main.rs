@@ -8,7 +8,7 @@ mod signatures;
 use std::f64::consts::TAU;
 
 use gearmodel::contact::{ContactModel, Profile, ToothDamage, ToothErrors};
-use gearmodel::effect::{Estimate, LIBRARY, Plan, Rig, Station, Value, by_name};
+use gearmodel::effect::{Estimate, LIBRARY, OperatingPoint, Plan, Rig, Value, by_name};
 use gearmodel::increment::common_normal;
 use gearmodel::{CircularSpec, CurveSpec, Direction, EllipticalSpec, Errors, GearPair, NominalModel, ToothSpec};
 use nalgebra::DMatrix;
@@ -66,15 +66,15 @@ fn plan() -> Plan {
     }
 }
 
-fn station(rig: &Rig, theta1_rad: f64, direction: Direction) -> Station {
-    let mut at = rig.station(theta1_rad, rig.pair().theta2(theta1_rad), direction);
+fn operating_point(rig: &Rig, theta1_rad: f64, direction: Direction) -> OperatingPoint {
+    let mut at = rig.operating_point(theta1_rad, rig.pair().theta2(theta1_rad), direction);
     at.load_nm = LOAD_NM;
     at.speed_rad_per_s = direction.sign() * RPM * TAU / 60.0;
     at.time_s = 100.0;
     at
 }
 
-fn row(rig: &Rig, name: &str, shape: &[f64], at: &Station) -> Vec<f64> {
+fn row(rig: &Rig, name: &str, shape: &[f64], at: &OperatingPoint) -> Vec<f64> {
     let (effect, shape) = (by_name(name).unwrap(), shape.to_vec());
     let mut row = vec![0.0; effect.width(rig, &shape)];
     effect.row(rig, &shape, at, &mut row);
@@ -106,12 +106,12 @@ fn compare(
     rig: &Rig,
     what: &str,
     tolerance: f64,
-    trace: impl Fn(&Station) -> f64,
+    trace: impl Fn(&OperatingPoint) -> f64,
     exact: impl Fn(f64, Direction) -> f64,
 ) {
     let (mut traces, mut exacts) = (Vec::new(), Vec::new());
     for (theta, direction) in places(60) {
-        traces.push(trace(&station(rig, theta, direction)));
+        traces.push(trace(&operating_point(rig, theta, direction)));
         exacts.push(exact(theta, direction));
     }
     let rest = left(&traces, &exacts);
@@ -127,7 +127,7 @@ fn every_trace_is_finite_on_every_kind_of_pair() {
         for effect in LIBRARY.iter().filter(|effect| effect.applies(&rig)) {
             for shape in effect.shapes(&rig, &plan()) {
                 for (theta, direction) in places(12) {
-                    let values = row(&rig, effect.name(), &shape, &station(&rig, theta, direction));
+                    let values = row(&rig, effect.name(), &shape, &operating_point(&rig, theta, direction));
                     assert!(values.iter().all(|x| x.is_finite()), "{} {shape:?} on {}", effect.name(), pair.kind());
                 }
                 let found = estimate(vec![1e-3; effect.width(&rig, &shape)]);
@@ -158,7 +158,7 @@ fn a_drive_without_teeth_has_no_effects_of_teeth() {
     expected.sort_unstable();
     assert_eq!(left_out, expected);
     // r2 = 1 mm and α = 0 stand in: a play of 1 mm along the normal is 1 rad.
-    let at = station(&rig, 0.3, Direction::Ccw);
+    let at = operating_point(&rig, 0.3, Direction::Ccw);
     assert!((row(&rig, "bearing_clearance", &[], &at)[0] + 1.0).abs() < 1e-15);
     assert!((row(&rig, "backlash_error", &[], &at)[0] + 0.5).abs() < 1e-15);
     let stiff = Rig::new(NominalModel::new(rig.pair().clone(), Errors::default()).unwrap(), [None; 2], None);
@@ -287,7 +287,7 @@ fn curves_and_clocking_are_differences_of_the_transmission() {
             |theta, _| 0.5 * (pair.theta2(theta + delta) - pair.theta2(theta - delta)),
         );
         // A wrong ratio is the same angle every turn.
-        let at = |theta: f64| row(&rig, "pitch_curve_error", &[1.0], &station(&rig, theta, Direction::Cw))[0];
+        let at = |theta: f64| row(&rig, "pitch_curve_error", &[1.0], &operating_point(&rig, theta, Direction::Cw))[0];
         assert!((at(1.3 + TAU) - at(1.3) - TAU).abs() < 1e-12);
     }
     // Another k has no meaning where there is no k.
@@ -325,7 +325,7 @@ fn the_most_advanced_tooth_carries_as_in_exact_contact() {
         let (mut off, mut count) = (0, 0);
         let mut sizes = Vec::new();
         for (theta, direction) in places(900) {
-            let at = station(&rig, theta, direction);
+            let at = operating_point(&rig, theta, direction);
             let trace: f64 = row(&rig, "pitch_errors", &shape, &at).iter().zip(&beta).map(|(x, b)| x * b).sum();
             let te = exact.te_rad(theta, direction).unwrap();
             sizes.push(te);
@@ -343,7 +343,7 @@ fn longer_tips_keep_two_pairs_in_contact_for_longer_up_to_a_racks() {
     for pair in [elliptic(0.3287), circular((23, 47))] {
         let rig = rig(&pair);
         let mean_pairs = |reach: f64| {
-            let at: Vec<Station> = places(900).map(|(theta, way)| station(&rig, theta, way)).collect();
+            let at: Vec<OperatingPoint> = places(900).map(|(theta, way)| operating_point(&rig, theta, way)).collect();
             at.iter().map(|at| rig.teeth_in_contact(at, reach).count()).sum::<usize>() as f64 / at.len() as f64
         };
         let ratios = [-0.5, 0.0, 0.5, 1.0].map(mean_pairs);
@@ -376,7 +376,7 @@ fn a_profile_is_that_of_exact_contact_on_either_flank() {
             let alike = waves(phi + quarter, phi + quarter - half);
             let own = waves(phi + quarter, phi + quarter);
             let first = 2 * (order as usize - 1);
-            let trace = |shape: f64, at: &Station| {
+            let trace = |shape: f64, at: &OperatingPoint| {
                 let row = row(&rig, "profile_error", &[shape], at);
                 amplitude_mm * (phi.cos() * row[first] - phi.sin() * row[first + 1])
             };
@@ -385,7 +385,7 @@ fn a_profile_is_that_of_exact_contact_on_either_flank() {
                 compare(&rig, &what, 0.01, |at| trace(shape, at), |theta, dir| exact.te_rad(theta, dir).unwrap());
             }
             // With a deviation a flank the cw flank has columns of its own.
-            let at = station(&rig, 0.4, Direction::Cw);
+            let at = operating_point(&rig, 0.4, Direction::Cw);
             let (wide, narrow) = (row(&rig, "profile_error", &[1.0], &at), row(&rig, "profile_error", &[0.0], &at));
             assert_eq!((&wide[..6], &wide[6..]), (&[0.0; 6][..], &narrow[..]));
         }
@@ -416,7 +416,7 @@ fn a_damaged_tooth_lags_while_it_alone_carries_as_in_exact_contact() {
             let shape = [f64::from(tooth), flank.sign(), width];
             let (mut traces, mut exacts) = (Vec::new(), Vec::new());
             for (theta, direction) in places(1500) {
-                let trace = depth_mm * row(&rig, "tooth_damage", &shape, &station(&rig, theta, direction))[0];
+                let trace = depth_mm * row(&rig, "tooth_damage", &shape, &operating_point(&rig, theta, direction))[0];
                 assert!(direction == flank || trace == 0.0);
                 assert!(trace * direction.sign() <= 0.0, "material is missing: the driven gear lags");
                 traces.push(trace);
@@ -426,8 +426,9 @@ fn a_damaged_tooth_lags_while_it_alone_carries_as_in_exact_contact() {
             assert!(rest < 0.01, "tooth {tooth} {flank} {}: {rest:.2e}", pair.kind());
             // The sector holds all of it, in the range of a turn about it.
             let [from, to] = by_name("tooth_damage").unwrap().signature_of(&rig, &shape.to_vec()).sector_deg.unwrap();
-            let middle = row(&rig, "tooth_damage", &shape, &station(&rig, (0.5 * (from + to)).to_radians(), flank))[0];
-            let beyond = row(&rig, "tooth_damage", &shape, &station(&rig, (to + 0.01).to_radians(), flank))[0];
+            let middle =
+                row(&rig, "tooth_damage", &shape, &operating_point(&rig, (0.5 * (from + to)).to_radians(), flank))[0];
+            let beyond = row(&rig, "tooth_damage", &shape, &operating_point(&rig, (to + 0.01).to_radians(), flank))[0];
             assert!(middle != 0.0 && beyond == 0.0 && from < to);
         }
     }
@@ -521,7 +522,7 @@ fn discs_and_couplings_are_those_of_exact_geometry() {
             ("encoder1_interpolation", "encoder2_interpolation", vec![1.0, lines], 1e-6, &signals(1e-6)),
         ];
         for (input, output, shape, amount, reading) in cases {
-            let trace = |name: &str, at: &Station| polar(amount, phase, &row(&rig, name, &shape, at));
+            let trace = |name: &str, at: &OperatingPoint| polar(amount, phase, &row(&rig, name, &shape, at));
             // The input encoder reads too much, so that less is expected to have been driven.
             compare(
                 &rig,
@@ -534,7 +535,7 @@ fn discs_and_couplings_are_those_of_exact_geometry() {
         }
         let beta = 0.02_f64;
         let (turned, amount) = (cardan(beta), 0.25 * beta * beta);
-        let trace = |name: &str, at: &Station| polar(amount, phase, &row(&rig, name, &[], at));
+        let trace = |name: &str, at: &OperatingPoint| polar(amount, phase, &row(&rig, name, &[], at));
         compare(
             &rig,
             "coupling_misalignment_input",
@@ -568,8 +569,8 @@ fn discs_and_couplings_are_those_of_exact_geometry() {
 }
 
 /// Stations of a turn in both senses.
-fn turn(rig: &Rig) -> Vec<Station> {
-    (0..720).flat_map(|n| Direction::BOTH.map(|d| station(rig, TAU * f64::from(n) / 720.0, d))).collect()
+fn turn(rig: &Rig) -> Vec<OperatingPoint> {
+    (0..720).flat_map(|n| Direction::BOTH.map(|d| operating_point(rig, TAU * f64::from(n) / 720.0, d))).collect()
 }
 
 #[test]
@@ -583,7 +584,7 @@ fn stiffness_varies_about_its_mean_where_the_teeth_change() {
                 for n in 0..count {
                     let pitches = f64::from(n) * f64::from(pair.teeth().0) / f64::from(count);
                     let theta = pair.theta1_at_arc_length(pitches * pair.pitch_mm().unwrap());
-                    let at = station(&rig, theta, direction);
+                    let at = operating_point(&rig, theta, direction);
                     let scaled =
                         row(&rig, "mesh_stiffness_variation", &shape, &at)[0] * at.arm_mm * at.arm_mm / LOAD_NM;
                     sum += scaled;
@@ -594,7 +595,8 @@ fn stiffness_varies_about_its_mean_where_the_teeth_change() {
             }
             // One pair alone at the pitch point is softer: a lag.
             let half = if direction == Direction::Ccw { 0.0 } else { 0.5 };
-            let at = station(&rig, pair.theta1_at_arc_length((3.0 + half) * pair.pitch_mm().unwrap()), direction);
+            let at =
+                operating_point(&rig, pair.theta1_at_arc_length((3.0 + half) * pair.pitch_mm().unwrap()), direction);
             for shape in [vec![0.3, -0.15], vec![]] {
                 assert!(row(&rig, "mesh_stiffness_variation", &shape, &at)[0] * direction.sign() < 0.0, "{shape:?}");
             }
@@ -607,7 +609,7 @@ fn heat_grows_the_centre_distance_and_saturates() {
     for pair in toothed() {
         let (rig, tau_s) = (rig(&pair), 40.0);
         for (theta, direction) in places(20) {
-            let mut at = station(&rig, theta, direction);
+            let mut at = operating_point(&rig, theta, direction);
             let full = row(&rig, "centre_distance_error", &[], &at)[0];
             for (time_s, share) in [(0.0, 0.0), (tau_s, 1.0 - (-1.0_f64).exp()), (1e5, 1.0)] {
                 at.time_s = time_s;

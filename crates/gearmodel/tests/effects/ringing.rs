@@ -42,7 +42,7 @@ fn an_excitation_rings_as_its_equation_of_motion_does() {
             let f_hz = RPM / 60.0 / part;
             // Away by many time constants, at an angle of no symmetry.
             let time_s = 30.3 / (zeta * f_hz);
-            let at = station(&rig, theta(time_s), direction);
+            let at = operating_point(&rig, theta(time_s), direction);
             for (number, full) in responses(f_hz, zeta, time_s, |t| theta(t).sin()).into_iter().enumerate() {
                 let trace = row(&rig, "torsional_resonance", &[0.0, f_hz, zeta, number as f64], &at)[0];
                 assert!((trace - full).abs() < 1e-4, "{direction} {part} {number}: {trace} {full}");
@@ -50,7 +50,7 @@ fn an_excitation_rings_as_its_equation_of_motion_does() {
         }
     }
     let size = |part: f64, zeta: f64, number: f64| {
-        let at = station(&rig, 0.3, Direction::Ccw);
+        let at = operating_point(&rig, 0.3, Direction::Ccw);
         let row = row(&rig, "torsional_resonance", &[0.0, RPM / 60.0 / part, zeta, number], &at);
         row[0].hypot(row[1])
     };
@@ -74,11 +74,11 @@ fn the_mesh_of_an_elliptic_pair_rings_as_its_equation_of_motion_does() {
     let (omega, zeta) = (RPM * TAU / 60.0, 0.05);
     for direction in Direction::BOTH {
         let theta = |t: f64| direction.sign() * omega * t;
-        let mesh = |t: f64| (TAU * station(&rig, theta(t), direction).pitches).sin();
+        let mesh = |t: f64| (TAU * operating_point(&rig, theta(t), direction).pitches).sin();
         for part in [0.8, 1.1] {
             let f_hz = teeth * RPM / 60.0 / part;
             for time_s in [20.0, 20.9, 22.3] {
-                let at = station(&rig, theta(time_s), direction);
+                let at = operating_point(&rig, theta(time_s), direction);
                 for (number, full) in responses(f_hz, zeta, time_s, mesh).into_iter().enumerate() {
                     let trace = row(&rig, "torsional_resonance", &[1.0, f_hz, zeta, number as f64], &at)[0];
                     assert!((trace - full).abs() < 5e-3, "{direction} {part} {number}: {trace} {full}");
@@ -100,7 +100,7 @@ fn an_encoder_on_its_coupling_swings_as_its_equation_of_motion_does() {
             for time_s in [300.0, 303.1, 307.7] {
                 let theta = |t: f64| direction.sign() * omega * t;
                 let lead = ring(f_hz, zeta, time_s, |t| -omega * omega * slope(theta(t)));
-                let at = station(&rig, theta(time_s), direction);
+                let at = operating_point(&rig, theta(time_s), direction);
                 let trace = row(&rig, "torsional_resonance", &[2.0, f_hz, zeta], &at)[0];
                 assert!((trace - lead).abs() < 2e-4, "{} {direction}: {trace} {lead}", pair.kind());
             }

@@ -83,11 +83,12 @@ fn parity_and_exponents_are_those_of_the_signature() {
         let round = pair.kind() == "circular";
         for (name, shape, beta) in sampled(&rig) {
             let what = format!("{name} {:?} on {}", &shape[..shape.len().min(3)], pair.kind());
-            let trace =
-                |at: &Station| -> f64 { row(&rig, name, &shape, at).iter().zip(&beta).map(|(x, b)| x * b).sum() };
-            let stations = turn(&rig);
+            let trace = |at: &OperatingPoint| -> f64 {
+                row(&rig, name, &shape, at).iter().zip(&beta).map(|(x, b)| x * b).sum()
+            };
+            let points_of_operation = turn(&rig);
             let (mut even, mut odd) = (0.0, 0.0);
-            for pair in stations.chunks(2) {
+            for pair in points_of_operation.chunks(2) {
                 let (ccw, cw) = (trace(&pair[0]), trace(&pair[1]));
                 even += (ccw + cw) * (ccw + cw);
                 odd += (ccw - cw) * (ccw - cw);
@@ -108,13 +109,13 @@ fn parity_and_exponents_are_those_of_the_signature() {
                 Parity::Mixed if name == "torsional_resonance" => {}
                 Parity::Mixed => assert!(share > 1e-3 && share < 1.0 - 1e-3, "{what}: odd part {share}"),
                 Parity::OneFlank => {
-                    let sizes =
-                        [0, 1].map(|n| stations.iter().skip(n).step_by(2).map(|at| trace(at).abs()).sum::<f64>());
+                    let sizes = [0, 1]
+                        .map(|n| points_of_operation.iter().skip(n).step_by(2).map(|at| trace(at).abs()).sum::<f64>());
                     assert!((sizes[0] == 0.0) != (sizes[1] == 0.0), "{what}: {sizes:?}");
                 }
             }
-            let size = |change: &dyn Fn(&mut Station)| {
-                let values: Vec<f64> = stations
+            let size = |change: &dyn Fn(&mut OperatingPoint)| {
+                let values: Vec<f64> = points_of_operation
                     .iter()
                     .map(|at| {
                         let mut at = *at;

@@ -302,8 +302,8 @@ impl Recording {
         }
         let read = this.read(py);
         let recording = read.recording()?;
-        for stretch in py.detach(|| recording.stretches()) {
-            let samples = PySlice::new(py, stretch.from as isize, stretch.to as isize, 1);
+        for segment in py.detach(|| recording.segments()) {
+            let samples = PySlice::new(py, segment.from as isize, segment.to as isize, 1);
             let part = |values: &Py<PyArray1<f64>>| -> Result<Py<PyArray1<f64>>> {
                 column("part", &values.bind(py).get_item(&samples)?).map(Bound::unbind)
             };
@@ -315,7 +315,7 @@ impl Recording {
                     theta2_rad: part(&this.theta2_rad)?,
                     load_nm: Condition::take("load_nm", &this.load_nm.part(py, &samples)?)?,
                     speed_rpm: Condition::take("speed_rpm", &this.speed_rpm.part(py, &samples)?)?,
-                    direction: Some(stretch.direction),
+                    direction: Some(segment.direction),
                     input_lines: this.input_lines,
                     output_lines: this.output_lines,
                 },

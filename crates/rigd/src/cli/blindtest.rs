@@ -8,13 +8,13 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Exit, fail, print};
-use blindtest::draw::Baselines;
+use blindtest::case_score::{Outcome, judge};
 use blindtest::family::Family;
+use blindtest::generate::Baselines;
 use blindtest::score::Score;
 use blindtest::seal::Sealed;
 use blindtest::set::SetPlan;
-use blindtest::verdict::{Outcome, judge};
-use blindtest::{ask, log, page, report};
+use blindtest::{log, page, query, report};
 use riglog::pair;
 
 /// Make withheld cases on the simulated rig, diagnose them, and score what was said against what was wrong.
@@ -119,7 +119,7 @@ fn one(plan: &SetPlan, directory: &Path, number: usize) -> Result<Outcome, Box<d
     // What the diagnosis shall do without is part of the question, not of the answer; nothing else of the label is used before it.
     let label = Sealed::open(directory, number, &log::sealed_hash(&path)?)?;
     let started = Instant::now();
-    Ok(match ask::diagnose(&path, &label.exclude) {
+    Ok(match query::diagnose(&path, &label.exclude) {
         Ok(answer) => judge(&label, &answer, started.elapsed().as_secs_f64()),
         Err(error) => Outcome::unanswered(&label, error.to_string()),
     })

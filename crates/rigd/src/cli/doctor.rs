@@ -59,7 +59,7 @@ pub fn main(args: &Args) -> Exit {
 fn simulated_links() -> Result<Links, String> {
     let (_, model) = pair::load(None).map_err(|error| error.to_string())?;
     let spec = simulated::spec(&model, &[]).map_err(|error| error.to_string())?;
-    simulated::start_in_process(&spec, rigsim::world::IDLE_RATE_HZ, 1).map_err(|error| error.to_string())
+    simulated::start_in_process(&spec, rigsim::simulated_rig::IDLE_RATE_HZ, 1).map_err(|error| error.to_string())
 }
 
 fn show(args: &Args, profile: &Profile, report: &Report) -> Exit {

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use super::{Exit, fail, print};
-use blindtest::draw::Baselines;
 use blindtest::family::Family;
+use blindtest::generate::Baselines;
 use blindtest::set::SetPlan;
 use riglog::pair;
 

@@ -17,7 +17,7 @@ use rigd::run::stop::StopRequests;
 use rigd::{replay, simulated};
 use riglog::pair;
 use riglog::{LogReader, Record, RunMetadata};
-use rigsim::world::World;
+use rigsim::simulated_rig::SimulatedRig;
 use tempfile::TempDir;
 use tokio::task::LocalSet;
 use tokio::time::sleep;
@@ -35,7 +35,7 @@ pub fn in_virtual_time<T>(work: impl Future<Output = T>) -> T {
 /// One rig and what is done to it.
 #[derive(Clone)]
 pub struct Bench {
-    pub world: Rc<RefCell<World>>,
+    pub world: Rc<RefCell<SimulatedRig>>,
     pub profile: Profile,
     pub clock: Clock,
     pub stop: StopRequests,
@@ -53,7 +53,7 @@ impl Bench {
         let sequence = &mut profile.sequence;
         (sequence.home_rpm, sequence.settle_s, sequence.load_s) = (30.0, 0.4, 0.4);
         Self {
-            world: Rc::new(RefCell::new(World::new(&spec, rate_hz, seed).expect("a world"))),
+            world: Rc::new(RefCell::new(SimulatedRig::new(&spec, rate_hz, seed).expect("a world"))),
             profile,
             clock: Clock::simulated(),
             stop: StopRequests::default(),

@@ -1,6 +1,6 @@
 //! The teeth were ground thinner than the drawing says: both flanks recede, whatever the load.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,8 +19,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Either sign.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("dj_mm", 0.02 * dice.sign())])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("dj_mm", 0.02 * rng.sign())])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

@@ -1,6 +1,6 @@
 //! The bearings have play: the force of the teeth pushes the gears apart until it is used up, whatever its size.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,7 +19,7 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Nothing but the size varies.
-fn draw(spec: &PlantSpec, _: &mut Dice) -> Parameters {
+fn draw(spec: &PlantSpec, _: &mut FaultRng) -> Parameters {
     usual(spec)
 }
 

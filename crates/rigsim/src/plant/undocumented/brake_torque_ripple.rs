@@ -1,6 +1,6 @@
 //! The brake's torque ripples over its turn, T (1 + ρ sin(n θ2 − phase)), and the drive train twists with it.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,8 +19,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("rho", 0.2), ("n", 1.0 + dice.below(8) as f64), ("phase_rad", dice.angle())])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("rho", 0.2), ("n", 1.0 + rng.below(8) as f64), ("phase_rad", rng.angle())])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

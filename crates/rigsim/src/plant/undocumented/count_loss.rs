@@ -1,6 +1,6 @@
 //! The output's counter misses edges now and then, always to the same side.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,8 +19,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Either sign, at a random rate.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("counts", 24.0 * dice.sign()), ("per_rev", dice.spread(0.1, 1.0))])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("counts", 24.0 * rng.sign()), ("per_rev", rng.spread(0.1, 1.0))])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

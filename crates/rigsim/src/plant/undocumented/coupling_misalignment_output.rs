@@ -1,7 +1,7 @@
 //! The coupling between gear 2 and the output encoder runs at an angle and turns unevenly, as Cardan's joint does: tan q_out = tan
 //! q_in/cos β.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -20,8 +20,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size; tan²(β/2) grows with the square of β.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("beta_rad", 0.014), ("phase_rad", dice.angle())])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("beta_rad", 0.014), ("phase_rad", rng.angle())])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

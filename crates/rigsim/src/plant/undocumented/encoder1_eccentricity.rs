@@ -1,6 +1,6 @@
 //! The input encoder's disc is not centred on the shaft.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,8 +19,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("eps", 4e-5), ("phase_rad", dice.angle())])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("eps", 4e-5), ("phase_rad", rng.angle())])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

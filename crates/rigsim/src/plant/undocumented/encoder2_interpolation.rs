@@ -1,6 +1,6 @@
 //! The output encoder's two signals are off their centre, so that every line is divided unevenly.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented, Value};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented, Value};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,8 +19,8 @@ fn usual(spec: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(spec: &PlantSpec, dice: &mut Dice) -> Parameters {
-    usual(spec).with("phase_rad", Value::Number(dice.angle()))
+fn draw(spec: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    usual(spec).with("phase_rad", Value::Number(rng.angle()))
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

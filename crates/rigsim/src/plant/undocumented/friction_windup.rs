@@ -1,7 +1,7 @@
 //! The seal at the output encoder drags: its torque twists all shafts before it, flips with the sense, and is no part of the known
 //! load.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -20,7 +20,7 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Nothing but the size varies.
-fn draw(spec: &PlantSpec, _: &mut Dice) -> Parameters {
+fn draw(spec: &PlantSpec, _: &mut FaultRng) -> Parameters {
     usual(spec)
 }
 

@@ -1,6 +1,6 @@
 //! Gear 2 sits on its shaft with another eccentricity than documented: the mounting was disturbed.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,8 +19,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    let angle = dice.angle();
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    let angle = rng.angle();
     Parameters::of(&[("dx_mm", 0.011 * angle.cos()), ("dy_mm", 0.011 * angle.sin())])
 }
 

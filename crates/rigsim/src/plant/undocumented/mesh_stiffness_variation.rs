@@ -1,7 +1,7 @@
 //! One pair of teeth in contact is softer than two; the mean over a pitch is documented, the difference is not. Two pairs touch
 //! over the share `duty` of the pitch, around half a pitch from the pitch point.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -20,8 +20,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("c_mm2_rad_per_nm", 2e-3), ("duty", dice.between(0.35, 0.8))])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("c_mm2_rad_per_nm", 2e-3), ("duty", rng.between(0.35, 0.8))])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

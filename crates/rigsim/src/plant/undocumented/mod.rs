@@ -15,7 +15,6 @@ pub mod centre_distance_error;
 pub mod count_loss;
 pub mod coupling_misalignment_input;
 pub mod coupling_misalignment_output;
-mod dice;
 pub mod encoder1_eccentricity;
 pub mod encoder1_ellipticity;
 pub mod encoder1_interpolation;
@@ -33,6 +32,7 @@ pub mod phasing_error;
 pub mod pitch_curve_error;
 pub mod pitch_errors;
 pub mod profile_error;
+mod rng;
 pub mod shaft_compliance_input;
 pub mod shaft_compliance_output;
 pub mod slip;
@@ -42,9 +42,9 @@ pub mod tooth_damage;
 pub mod torsional_resonance;
 pub mod wear_drift;
 
-pub use dice::Dice;
 pub use outside::OUTSIDE;
 pub use parameters::{Parameters, Value};
+pub use rng::FaultRng;
 
 /// An effect of the plant.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +56,7 @@ pub struct Undocumented {
     /// Its parameters at the usual size on a plant.
     pub usual: fn(&PlantSpec) -> Parameters,
     /// Its parameters about the usual size, phases and places at random.
-    pub draw: fn(&PlantSpec, &mut Dice) -> Parameters,
+    pub draw: fn(&PlantSpec, &mut FaultRng) -> Parameters,
     /// The parameters that carry its size, and the power of the size with which each goes.
     pub amounts: &'static [(&'static str, f64)],
     /// Whether what it adds changes from revolution to revolution.
@@ -128,7 +128,7 @@ mod tests {
             assert!(!effect.summary.is_empty());
             assert!(Plant::new(&spec, 10_000.0, 1).is_ok(), "{}", effect.name);
             let mut drawn = PlantSpec::default();
-            let parameters = (effect.draw)(&drawn, &mut Dice::new(5));
+            let parameters = (effect.draw)(&drawn, &mut FaultRng::new(5));
             (effect.apply)(&mut drawn, &parameters);
             assert!(Plant::new(&drawn, 10_000.0, 1).is_ok(), "{}", effect.name);
         }

@@ -1,6 +1,6 @@
 //! Gear 1 is clocked against the index of its encoder: it stands ahead of what the encoder reads.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,8 +19,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Either sign.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("delta_rad", 5e-5 * dice.sign())])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("delta_rad", 5e-5 * rng.sign())])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

@@ -1,6 +1,6 @@
 //! The pitch curve was cut to another eccentricity k; the pair is mounted at the distance at which it closes.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,8 +19,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Either sign.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("dk", 3e-5 * dice.sign())])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("dk", 3e-5 * rng.sign())])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

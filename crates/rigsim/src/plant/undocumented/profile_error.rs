@@ -1,7 +1,7 @@
 //! Every tooth has the same error of profile: the driven gear moves ahead by Σ a_n sin(n 2π s − ph_n) along the normal, s the pitch
 //! arc from θ1 = 0 in pitches, in both senses alike.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use crate::plant::ProfileOrder;
 
 /// The effect.
@@ -28,14 +28,14 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
     Parameters::of(&[
         ("a1_mm", 2e-3),
-        ("ph1_rad", dice.angle()),
-        ("a2_mm", 1e-3 * dice.between(0.0, 1.0)),
-        ("ph2_rad", dice.angle()),
-        ("a3_mm", 5e-4 * dice.between(0.0, 1.0)),
-        ("ph3_rad", dice.angle()),
+        ("ph1_rad", rng.angle()),
+        ("a2_mm", 1e-3 * rng.between(0.0, 1.0)),
+        ("ph2_rad", rng.angle()),
+        ("a3_mm", 5e-4 * rng.between(0.0, 1.0)),
+        ("ph3_rad", rng.angle()),
     ])
 }
 

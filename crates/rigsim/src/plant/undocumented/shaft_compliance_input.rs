@@ -1,6 +1,6 @@
 //! The shaft between input encoder and gear 1 is softer than documented: a key that gives, a longer shaft.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,7 +19,7 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Nothing but the size varies.
-fn draw(spec: &PlantSpec, _: &mut Dice) -> Parameters {
+fn draw(spec: &PlantSpec, _: &mut FaultRng) -> Parameters {
     usual(spec)
 }
 

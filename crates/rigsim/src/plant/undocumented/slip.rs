@@ -1,7 +1,7 @@
 //! The clamp between gear 2 and the output encoder creeps under load: it holds up to a torque, and above it gives way in small
 //! events, a little every revolution, so the lag accumulates.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -20,8 +20,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("k_rad_per_rev_nm", 4e-6), ("t0_nm", dice.between(2.0, 8.0))])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("k_rad_per_rev_nm", 4e-6), ("t0_nm", rng.between(2.0, 8.0))])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

@@ -1,6 +1,6 @@
 //! The housing warms up after the start and moves the gears apart, as 1 − exp(−t/τ).
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,8 +19,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("da_mm", 0.02), ("tau_s", dice.spread(60.0, 600.0))])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("da_mm", 0.02), ("tau_s", rng.spread(60.0, 600.0))])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

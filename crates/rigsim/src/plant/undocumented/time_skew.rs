@@ -1,6 +1,6 @@
 //! The output encoder is latched later than the input: two readers with a clock each, or a filter in one of them.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 
 /// The effect.
 pub const EFFECT: Undocumented = Undocumented {
@@ -19,8 +19,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Either sign.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("dt_s", 60e-6 * dice.sign())])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("dt_s", 60e-6 * rng.sign())])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

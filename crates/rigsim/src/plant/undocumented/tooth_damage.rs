@@ -1,7 +1,7 @@
 //! Material is missing on one flank of one tooth of the driver: the driven gear lags by depth · cos²(π u/(2 w)) along the normal
 //! where the tooth is |u| < w pitches from the pitch point.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented, Value};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented, Value};
 use crate::plant::{DamageSpec, Flank};
 
 /// The effect.
@@ -21,10 +21,10 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(spec: &PlantSpec, dice: &mut Dice) -> Parameters {
-    let flank = if dice.sign() > 0.0 { "ccw" } else { "cw" };
-    let tooth = dice.below(spec.gears.teeth[0] as usize) as f64;
-    Parameters::of(&[("tooth", tooth), ("depth_mm", 0.015), ("width", dice.between(0.4, 1.2))])
+fn draw(spec: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    let flank = if rng.sign() > 0.0 { "ccw" } else { "cw" };
+    let tooth = rng.below(spec.gears.teeth[0] as usize) as f64;
+    Parameters::of(&[("tooth", tooth), ("depth_mm", 0.015), ("width", rng.between(0.4, 1.2))])
         .with("flank", Value::Word(flank.into()))
 }
 

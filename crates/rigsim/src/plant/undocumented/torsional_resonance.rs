@@ -1,6 +1,6 @@
 //! The output encoder hangs on a soft coupling: its disc swings under the shaft's uneven motion, ẍ + 2ζω ẋ + ω² x = −q̈.
 
-use super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use crate::plant::SoftCouplingSpec;
 
 /// The effect.
@@ -20,8 +20,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size; far below the resonance the twist grows with 1/f².
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("f_hz", 12.0), ("zeta", dice.spread(0.02, 0.2))])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("f_hz", 12.0), ("zeta", rng.spread(0.02, 0.2))])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

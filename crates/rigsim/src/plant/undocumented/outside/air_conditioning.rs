@@ -1,6 +1,6 @@
 //! The room's temperature swings and turns the encoder's mount slowly to and fro.
 
-use super::super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use super::wave;
 use crate::plant::{Carrier, Weight};
 
@@ -21,8 +21,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", dice.angle()), ("period_s", dice.spread(15.0, 90.0))])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", rng.angle()), ("period_s", rng.spread(15.0, 90.0))])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

@@ -1,6 +1,6 @@
 //! A belt in the input encoder's drive goes round less often than the shaft: an order that is no whole number.
 
-use super::super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use super::wave;
 use crate::plant::{Carrier, Weight};
 
@@ -21,8 +21,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", dice.angle()), ("order", dice.between(0.15, 0.85))])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", rng.angle()), ("order", rng.between(0.15, 0.85))])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

@@ -1,6 +1,6 @@
 //! A converter weighs one bit wrongly: a square wave over the turn of the output encoder.
 
-use super::super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use crate::plant::{Carrier, Oddity, Weight};
 
 /// The effect.
@@ -20,8 +20,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", dice.angle()), ("order", 2f64.powi(4 + dice.below(4) as i32))])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", rng.angle()), ("order", 2f64.powi(4 + rng.below(4) as i32))])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

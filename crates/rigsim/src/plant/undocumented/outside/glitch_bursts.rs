@@ -1,6 +1,6 @@
 //! The output's interpolator loses its lock for moments: bursts of wrong readings.
 
-use super::super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use crate::plant::Oddity;
 
 /// The effect.
@@ -20,8 +20,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("a_rad", 3e-4), ("per_minute", dice.spread(2.0, 8.0)), ("length_s", dice.spread(0.05, 0.3))])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("a_rad", 3e-4), ("per_minute", rng.spread(2.0, 8.0)), ("length_s", rng.spread(0.05, 0.3))])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

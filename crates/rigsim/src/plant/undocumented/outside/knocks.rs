@@ -1,6 +1,6 @@
 //! Somebody knocks against the rig now and then; the mount of the output encoder rings out.
 
-use super::super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use crate::plant::Oddity;
 
 /// The effect.
@@ -20,12 +20,12 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
     Parameters::of(&[
         ("a_rad", 4e-4),
-        ("per_minute", dice.spread(2.0, 8.0)),
-        ("decay_s", dice.spread(0.1, 0.5)),
-        ("ring_hz", dice.spread(2.0, 12.0)),
+        ("per_minute", rng.spread(2.0, 8.0)),
+        ("decay_s", rng.spread(0.1, 0.5)),
+        ("ring_hz", rng.spread(2.0, 12.0)),
     ])
 }
 

@@ -1,6 +1,6 @@
 //! The output encoder's mount creeps steadily, turning or not.
 
-use super::super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use crate::plant::Oddity;
 
 /// The effect.
@@ -20,8 +20,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("rad_per_s", 2e-7 * dice.sign())])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("rad_per_s", 2e-7 * rng.sign())])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

@@ -1,6 +1,6 @@
 //! A cable picks up a tone: the reading swings at a fixed frequency, whatever the shaft does.
 
-use super::super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use super::wave;
 use crate::plant::{Carrier, Weight};
 
@@ -21,8 +21,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", dice.angle()), ("f_hz", dice.spread(2.0, 60.0))])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", rng.angle()), ("f_hz", rng.spread(2.0, 60.0))])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

@@ -1,6 +1,6 @@
 //! After a reversal into one sense the output encoder's seat settles over a turn or two; after the other it does not.
 
-use super::super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use crate::plant::Oddity;
 
 /// The effect.
@@ -20,8 +20,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("a_rad", 1e-4 * dice.sign()), ("travel_rad", dice.spread(5.0, 15.0)), ("sense", dice.sign())])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("a_rad", 1e-4 * rng.sign()), ("travel_rad", rng.spread(5.0, 15.0)), ("sense", rng.sign())])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

@@ -1,6 +1,6 @@
 //! A three-jaw chuck holds the output encoder's hub: the reading errs three times a turn.
 
-use super::super::{Dice, Parameters, PlantSpec, Undocumented};
+use super::super::{FaultRng, Parameters, PlantSpec, Undocumented};
 use super::wave;
 use crate::plant::{Carrier, Weight};
 
@@ -21,8 +21,8 @@ fn usual(_: &PlantSpec) -> Parameters {
 }
 
 /// Random in all but the size.
-fn draw(_: &PlantSpec, dice: &mut Dice) -> Parameters {
-    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", dice.angle())])
+fn draw(_: &PlantSpec, rng: &mut FaultRng) -> Parameters {
+    Parameters::of(&[("a_rad", 4e-5), ("phase_rad", rng.angle())])
 }
 
 fn apply(spec: &mut PlantSpec, parameters: &Parameters) {

@@ -1,7 +1,7 @@
 //! Columns of all candidates over the grid, and the sums from which every fit is made.
 //!
 //! A block's raw columns are turned into unit-RMS orthogonal ones, so that an amplitude is the RMS of its trace in rad; directions
-//! that the plan cannot see are dropped. After [`Pool::new`] nothing touches the places any more: all fits, with whatever
+//! that the plan cannot see are dropped. After [`DesignMatrix::new`] nothing touches the places any more: all fits, with whatever
 //! noise, come from XᵀWX and from the columns' low-order waves in each revolution.
 
 use std::sync::Arc;
@@ -12,9 +12,9 @@ use rayon::prelude::*;
 use super::columns::{Columns, Values};
 use super::gram;
 use super::grid::Grid;
-use super::unknown::Pattern;
+use super::nuisance_patterns::Pattern;
 use super::waves::{WAVES, waves};
-use gearmodel::effect::{Effect, Grain, Rig, Rows, Shape, Station};
+use gearmodel::effect::{Effect, Grain, OperatingPoint, Rig, Rows, Shape};
 
 /// Column of the residual and of the zero in the pool.
 pub(super) const RESIDUAL: usize = 0;
@@ -24,7 +24,7 @@ pub(super) const WIDE: usize = 16;
 
 /// What a block of columns stands for.
 #[derive(Clone)]
-pub enum Cause {
+pub enum Candidate {
     /// An effect of the library, at one shape.
     Effect {
         /// The effect.
@@ -40,7 +40,7 @@ pub enum Cause {
     Unknown(Pattern),
 }
 
-impl Cause {
+impl Candidate {
     /// Its columns before those that the plan cannot see are dropped.
     fn width(&self, rig: &Rig) -> usize {
         match self {
@@ -84,7 +84,7 @@ impl Cause {
 #[derive(Clone)]
 pub struct Block {
     /// What it stands for.
-    pub cause: Cause,
+    pub cause: Candidate,
     /// Its columns in the pool.
     pub columns: std::ops::Range<usize>,
     /// Raw amplitudes = `transform` · amplitudes in the pool.
@@ -101,7 +101,7 @@ impl Block {
 
 /// All blocks with their sums. Column 0 is the residual, column 1 the free zero.
 #[derive(Clone)]
-pub struct Pool {
+pub struct DesignMatrix {
     /// Blocks.
     pub blocks: Vec<Block>,
     columns: Columns,
@@ -145,20 +145,20 @@ impl Base {
     }
 }
 
-/// Rows of a cause at stations.
-fn rows(cause: &Cause, rig: &Rig, stations: &[Station], width: usize) -> DMatrix<f64> {
-    let mut raw = DMatrix::zeros(stations.len(), width);
+/// Rows of a cause at points_of_operation.
+fn rows(cause: &Candidate, rig: &Rig, points_of_operation: &[OperatingPoint], width: usize) -> DMatrix<f64> {
+    let mut raw = DMatrix::zeros(points_of_operation.len(), width);
     let (mut row, mut part) = (vec![0.0; width], vec![0.0; width]);
     let grain = match cause {
-        Cause::Effect { effect, shape, .. } => effect.grain(shape),
-        Cause::Unknown(_) => Grain::Smooth,
+        Candidate::Effect { effect, shape, .. } => effect.grain(shape),
+        Candidate::Unknown(_) => Grain::Smooth,
     };
     let places = grain.places();
     let mut take: Rows<'_> = match cause {
-        Cause::Effect { effect, shape, .. } => effect.rows(rig, shape),
-        Cause::Unknown(pattern) => Box::new(|station, row| pattern.row(station, row)),
+        Candidate::Effect { effect, shape, .. } => effect.rows(rig, shape),
+        Candidate::Unknown(pattern) => Box::new(|station, row| pattern.row(station, row)),
     };
-    for (number, station) in stations.iter().enumerate() {
+    for (number, station) in points_of_operation.iter().enumerate() {
         row.fill(0.0);
         if grain == Grain::Smooth {
             take(station, &mut row);
@@ -199,7 +199,7 @@ const BATCH: usize = 64;
 /// Traces smaller than this part of a block's largest direction are not seen under the plan.
 const UNSEEN: f64 = 1e-5;
 
-impl Pool {
+impl DesignMatrix {
     /// The residual and the zero, without blocks.
     #[must_use]
     pub fn new(grid: &Grid) -> Self {
@@ -261,10 +261,10 @@ impl Pool {
     }
 
     /// Adds blocks; those that the plan cannot see are left out. Returns the numbers of those added.
-    pub fn add(&mut self, grid: &Grid, rig: &Rig, causes: &[Cause]) -> Vec<usize> {
+    pub fn add(&mut self, grid: &Grid, rig: &Rig, causes: &[Candidate]) -> Vec<usize> {
         let mut numbers = Vec::new();
         let (evolving, others): (Vec<_>, Vec<_>) = causes.iter().partition(|cause| cause.evolves());
-        let width = |causes: &[&Cause]| causes.iter().map(|cause| cause.width(rig)).sum();
+        let width = |causes: &[&Candidate]| causes.iter().map(|cause| cause.width(rig)).sum();
         self.columns.reserve(grid, width(&others), width(&evolving));
         // Not all at once: before a column stands among the others it takes up memory twice.
         for batch in causes.chunks(BATCH) {
@@ -281,17 +281,17 @@ impl Pool {
         numbers
     }
 
-    fn unit_columns(&self, grid: &Grid, rig: &Rig, cause: &Cause) -> Option<(Vec<Values>, DMatrix<f64>)> {
+    fn unit_columns(&self, grid: &Grid, rig: &Rig, cause: &Candidate) -> Option<(Vec<Values>, DMatrix<f64>)> {
         let (width, evolves) = (cause.width(rig), cause.evolves());
-        let (stations, weights) =
+        let (points_of_operation, weights) =
             if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.base.cell_weight) };
         let growing = match cause {
-            Cause::Unknown(pattern) => pattern.growing(),
-            Cause::Effect { .. } => None,
+            Candidate::Unknown(pattern) => pattern.growing(),
+            Candidate::Effect { .. } => None,
         };
         let raw = match growing {
-            Some((steady, mean_s)) => grown(grid, &rows(&Cause::Unknown(steady), rig, &grid.cells, width), mean_s),
-            None => rows(cause, rig, stations, width),
+            Some((steady, mean_s)) => grown(grid, &rows(&Candidate::Unknown(steady), rig, &grid.cells, width), mean_s),
+            None => rows(cause, rig, points_of_operation, width),
         };
         let total: f64 = weights.iter().sum();
         // A constant is the zero's; what is left of a column is its trace.
@@ -306,7 +306,7 @@ impl Pool {
         if scale.max() < 1e-9 * size {
             return None;
         }
-        if matches!(cause, Cause::Unknown(pattern) if pattern.keeps_sizes()) {
+        if matches!(cause, Candidate::Unknown(pattern) if pattern.keeps_sizes()) {
             let transform = DMatrix::identity(width, width) * (width as f64 / covariance.trace()).sqrt();
             return Some(values(&(raw * transform[(0, 0)]), evolves, transform));
         }

@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 
+use super::design_matrix::ZERO;
+use super::design_matrix::{Block, Candidate, DesignMatrix};
 use super::noise::Whitened;
-use super::pool::ZERO;
-use super::pool::{Block, Cause, Pool};
 use super::search::Model;
 use gearmodel::effect::LIBRARY;
 
@@ -17,7 +17,7 @@ const MUCH_WIDER: usize = 8;
 
 /// Probabilities from all models seen.
 #[derive(Clone, Debug)]
-pub struct Attribution {
+pub struct Posterior {
     /// Posterior inclusion by place in the library.
     pub probability: Vec<f64>,
     /// Best block of every effect: of the most probable models that have it, else the one that fits best alone.
@@ -30,14 +30,14 @@ pub struct Attribution {
 
 fn number(block: &Block) -> Option<usize> {
     match &block.cause {
-        Cause::Effect { number, .. } => Some(*number),
-        Cause::Unknown(_) => None,
+        Candidate::Effect { number, .. } => Some(*number),
+        Candidate::Unknown(_) => None,
     }
 }
 
 /// Posterior of effects. `sharpness` under 1 flattens what the noise model's own error makes too sure.
 #[must_use]
-pub fn attribute(pool: &Pool, models: &[Model], sharpness: f64) -> Attribution {
+pub fn posterior(pool: &DesignMatrix, models: &[Model], sharpness: f64) -> Posterior {
     let best = models.first().map_or(0.0, |m| m.score);
     let mut weights: Vec<f64> = models.iter().map(|m| (sharpness * (m.score - best)).exp()).collect();
     let total: f64 = weights.iter().sum();
@@ -61,13 +61,13 @@ pub fn attribute(pool: &Pool, models: &[Model], sharpness: f64) -> Attribution {
             unknown += weight;
         }
     }
-    Attribution { probability, block, unknown, weights }
+    Posterior { probability, block, unknown, weights }
 }
 
 /// Largest principal angle between two blocks' subspaces, of the smaller one's directions, as the noise weighs them and with
 /// the zero free, deg.
 #[must_use]
-pub fn angle_deg(pool: &Pool, whitened: &Whitened, a: usize, b: usize) -> f64 {
+pub fn angle_deg(pool: &DesignMatrix, whitened: &Whitened, a: usize, b: usize) -> f64 {
     let (a, b) = (&pool.blocks[a], &pool.blocks[b]);
     let g = &whitened.gram;
     let zero = g[(ZERO, ZERO)];
@@ -88,15 +88,15 @@ pub fn angle_deg(pool: &Pool, whitened: &Whitened, a: usize, b: usize) -> f64 {
 /// Effects that stand under [`SAME_DEG`] from `effect` in this plan and fit the data about as well: their places in the library
 /// with the angle, the effect itself not included.
 #[must_use]
-pub fn twins(
-    pool: &Pool,
+pub fn confusable(
+    pool: &DesignMatrix,
     whitened: &Whitened,
-    attribution: &Attribution,
+    posterior: &Posterior,
     effect: usize,
     swapped_score: &mut dyn FnMut(usize) -> Option<f64>,
     best_score: f64,
 ) -> Vec<(usize, f64)> {
-    let Some(own) = attribution.block[effect] else { return Vec::new() };
+    let Some(own) = posterior.block[effect] else { return Vec::new() };
     let own_width = pool.blocks[own].width();
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
     for (b, block) in pool.blocks.iter().enumerate() {

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use super::draw::{Label, LabelledEffect};
 use super::family::Family;
+use super::generate::{Label, LabelledEffect};
 use super::signature;
 use rigsim::plant::undocumented::{self, find};
 

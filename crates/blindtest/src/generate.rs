@@ -13,7 +13,7 @@ use super::size::Baseline;
 use crate::plant_of_pair::plant_of_pair;
 use riglog::pair;
 use rigsim::plant::PlantSpec;
-use rigsim::plant::undocumented::{Dice, OUTSIDE, Parameters, UNDOCUMENTED, Undocumented, Value, find};
+use rigsim::plant::undocumented::{FaultRng, OUTSIDE, Parameters, UNDOCUMENTED, Undocumented, Value, find};
 
 /// Effects that leave one and the same trace on the built-in pair; no case holds two of a row, for no analysis could tell them apart.
 const TIED: &[&[&str]] = &[
@@ -104,15 +104,15 @@ pub fn make(
     baselines: &Baselines,
 ) -> Result<Case, BlindError> {
     // Seeds of neighbouring cases share nothing.
-    let mut dice = Dice::new(seed ^ (number as u64 + 1).wrapping_mul(0xD134_2543_DE82_EF95));
-    let chosen = choose(&mut dice, family, before);
+    let mut rng = FaultRng::new(seed ^ (number as u64 + 1).wrapping_mul(0xD134_2543_DE82_EF95));
+    let chosen = choose(&mut rng, family, before);
     let size_of = |suffix: &str| {
         let sizes = chosen.iter().filter(|(effect, _)| effect.name.ends_with(suffix)).map(|(_, rms)| *rms);
         sizes.reduce(f64::max)
     };
     let nominal = pair::parse(pair_toml, "pair.toml".as_ref())?;
     let conditions = Conditions::draw(
-        &mut dice,
+        &mut rng,
         nominal.errors.mesh_compliance_mm2_rad_per_nm,
         size_of("_interpolation"),
         size_of("mesh_stiffness_variation"),
@@ -128,7 +128,7 @@ pub fn make(
         let baseline = baseline_of(baselines, &sound, &plan)?;
         let sizing = Sizing { sound: &sound, baseline: &baseline, plan: &plan, seed: conditions.seed };
         for (effect, wanted_rad) in &chosen {
-            let (parameters, size_rad) = fit(effect, *wanted_rad, &sizing, &mut dice)?;
+            let (parameters, size_rad) = fit(effect, *wanted_rad, &sizing, &mut rng)?;
             (effect.apply)(&mut spec, &parameters);
             let outside = OUTSIDE.iter().any(|other| other.name == effect.name);
             effects.push(LabelledEffect { name: effect.name.into(), outside, parameters, rms_rad: size_rad });
@@ -168,7 +168,7 @@ pub fn tied_to(name: &str) -> Vec<&str> {
 }
 
 /// Which effects, and their sizes.
-fn choose(dice: &mut Dice, family: Family, before: usize) -> Vec<(&'static Undocumented, f64)> {
+fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Undocumented, f64)> {
     /// Effects whose trace nothing else in the library resembles.
     const ALONE: [&str; 12] = [
         "time_skew",
@@ -184,34 +184,34 @@ fn choose(dice: &mut Dice, family: Family, before: usize) -> Vec<(&'static Undoc
         "torsional_resonance",
         "profile_error",
     ];
-    let several = |dice: &mut Dice, count: usize| {
+    let several = |rng: &mut FaultRng, count: usize| {
         let mut chosen: Vec<(&'static Undocumented, f64)> = Vec::new();
         while chosen.len() < count {
-            let effect = &UNDOCUMENTED[dice.below(UNDOCUMENTED.len())];
+            let effect = &UNDOCUMENTED[rng.below(UNDOCUMENTED.len())];
             let tied = tied_to(effect.name);
             if chosen.iter().all(|(other, _)| !tied.contains(&other.name)) {
-                chosen.push((effect, dice.spread(TOGETHER_RAD.0, TOGETHER_RAD.1)));
+                chosen.push((effect, rng.spread(TOGETHER_RAD.0, TOGETHER_RAD.1)));
             }
         }
         chosen
     };
-    let unknown = |dice: &mut Dice| (&OUTSIDE[before % OUTSIDE.len()], dice.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1));
+    let unknown = |rng: &mut FaultRng| (&OUTSIDE[before % OUTSIDE.len()], rng.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1));
     match family {
         Family::Null => Vec::new(),
         Family::Single => {
             let (effect, round) = (before % UNDOCUMENTED.len(), before / UNDOCUMENTED.len());
             vec![(&UNDOCUMENTED[effect], SINGLE_SIZES_RAD[(effect + round) % SINGLE_SIZES_RAD.len()])]
         }
-        Family::Pair => several(dice, 2),
-        Family::Triple => several(dice, 3),
-        Family::Outside => vec![unknown(dice)],
+        Family::Pair => several(rng, 2),
+        Family::Triple => several(rng, 3),
+        Family::Outside => vec![unknown(rng)],
         Family::Mixed => {
-            let mut chosen = several(dice, 1);
-            chosen.push(unknown(dice));
+            let mut chosen = several(rng, 1);
+            chosen.push(unknown(rng));
             chosen
         }
         Family::LeftOut => find(ALONE[before % ALONE.len()])
-            .map(|effect| (effect, dice.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1)))
+            .map(|effect| (effect, rng.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1)))
             .into_iter()
             .collect(),
     }
@@ -237,7 +237,7 @@ fn fit(
     effect: &Undocumented,
     wanted_rad: f64,
     sizing: &Sizing<'_>,
-    dice: &mut Dice,
+    rng: &mut FaultRng,
 ) -> Result<(Parameters, f64), BlindError> {
     /// Fresh draws, where one shows nothing.
     const DRAWS: usize = 5;
@@ -246,7 +246,7 @@ fn fit(
     /// Steps back from what cannot be built.
     const STEPS_BACK: usize = 40;
     for _ in 0..DRAWS {
-        let mut parameters = (effect.draw)(sizing.sound, dice);
+        let mut parameters = (effect.draw)(sizing.sound, rng);
         let mut best = None;
         let mut limited = false;
         for _ in 0..CORRECTIONS {
@@ -314,7 +314,7 @@ mod tests {
     fn singles_go_through_every_effect_at_every_size() {
         let mut seen = std::collections::BTreeSet::new();
         for n in 0..4 * UNDOCUMENTED.len() {
-            let chosen = choose(&mut Dice::new(1), Family::Single, n);
+            let chosen = choose(&mut FaultRng::new(1), Family::Single, n);
             assert!(seen.insert((chosen[0].0.name, (chosen[0].1 * 1e7) as u64)));
         }
     }
@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn no_case_holds_what_nobody_can_tell_apart() {
         for n in 0..200 {
-            let chosen = choose(&mut Dice::new(n), Family::Triple, 0);
+            let chosen = choose(&mut FaultRng::new(n), Family::Triple, 0);
             for (k, (effect, _)) in chosen.iter().enumerate() {
                 let tied = tied_to(effect.name);
                 assert!(chosen[..k].iter().all(|(other, _)| !tied.contains(&other.name)));

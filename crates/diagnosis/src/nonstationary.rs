@@ -18,7 +18,7 @@ const MOST_BETWEEN: usize = 4;
 
 /// Causes in a pool of their own, with what each would add to the set that stands there.
 struct Beside {
-    pool: Pool,
+    pool: DesignMatrix,
     /// Blocks tried with their gain in log evidence.
     gains: Vec<(usize, f64)>,
 }
@@ -34,8 +34,10 @@ impl Engine<'_> {
     fn steady_set(&self) -> Vec<usize> {
         let Some(best) = &self.best else { return Vec::new() };
         let steady = |b: &usize| match &self.pool.blocks[*b].cause {
-            Cause::Effect { effect, shape, .. } => effect.signature_of(self.rig, shape).accumulates == Accumulates::No,
-            Cause::Unknown(pattern) => !pattern.moves_levels(),
+            Candidate::Effect { effect, shape, .. } => {
+                effect.signature_of(self.rig, shape).accumulates == Accumulates::No
+            }
+            Candidate::Unknown(pattern) => !pattern.moves_levels(),
         };
         best.fit.set.iter().copied().filter(steady).collect()
     }
@@ -53,12 +55,12 @@ impl Engine<'_> {
         let steady = self.steady_amplitudes();
         let found = events::find(&self.grid, &self.pool, &self.noise, &amplitudes, &steady);
         let mut causes = Vec::new();
-        causes.extend(found.patterns.into_iter().map(Cause::Unknown));
+        causes.extend(found.patterns.into_iter().map(Candidate::Unknown));
         let excluded = |effect: &dyn Effect| self.options.exclude.iter().any(|name| name == effect.name());
         if let Some((number, effect)) = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.steps() && !excluded(*e)) {
             let steps = |times_s: Vec<f64>| {
                 let cost_nats = events::steps_cost_nats(times_s.len());
-                Cause::Effect { effect, number, shape: times_s, cost_nats }
+                Candidate::Effect { effect, number, shape: times_s, cost_nats }
             };
             causes.extend(found.steps.into_iter().map(steps));
             causes.extend(self.steps_between_runs(&steps).into_iter().flatten().map(steps));
@@ -71,11 +73,11 @@ impl Engine<'_> {
 
     /// The steps of the best model and those between runs that were taken for levels of theirs: as they are, and each moved to where
     /// it fits best.
-    fn steps_between_runs(&self, steps: &dyn Fn(Vec<f64>) -> Cause) -> Option<[Vec<f64>; 3]> {
+    fn steps_between_runs(&self, steps: &dyn Fn(Vec<f64>) -> Candidate) -> Option<[Vec<f64>; 3]> {
         let best = self.best.as_ref()?;
         let fit = &best.fit;
         let (mut times_s, size_rad) = (0..fit.set.len()).find_map(|n| match &self.pool.blocks[fit.set[n]].cause {
-            Cause::Effect { effect, shape, .. } if effect.steps() && shape.len() > 1 => {
+            Candidate::Effect { effect, shape, .. } if effect.steps() && shape.len() > 1 => {
                 Some((shape.clone(), self.raw(best, n).beta[0]))
             }
             _ => None,
@@ -83,8 +85,8 @@ impl Engine<'_> {
         // Without effects that show as levels only: they have taken the steps up.
         let mut others = self.steady_set();
         others.retain(|b| match &self.pool.blocks[*b].cause {
-            Cause::Effect { effect, shape, .. } => effect.signature_of(self.rig, shape).carrier != Carrier::None,
-            Cause::Unknown(_) => true,
+            Candidate::Effect { effect, shape, .. } => effect.signature_of(self.rig, shape).carrier != Carrier::None,
+            Candidate::Unknown(_) => true,
         });
         let mut before = f64::NEG_INFINITY;
         for _ in 0..MOST_BETWEEN {
@@ -96,7 +98,7 @@ impl Engine<'_> {
             let tried = std::iter::once(with(None)).chain(self.grid.plan.starts_s.iter().map(|t| with(Some(t))));
             let beside = self.beside(&others, &tried.collect::<Vec<_>>())?;
             let (best, gain) = beside.best()?;
-            let Cause::Effect { shape, .. } = &beside.pool.blocks[best].cause else { return None };
+            let Candidate::Effect { shape, .. } = &beside.pool.blocks[best].cause else { return None };
             let cost_nats = events::steps_cost_nats(shape.len()) - events::steps_cost_nats(times_s.len());
             if gain < before + cost_nats || *shape == times_s {
                 break;
@@ -125,7 +127,7 @@ impl Engine<'_> {
         let worth_it: Vec<Pattern> =
             settles.into_iter().chain(others).filter(|(nats, _)| *nats > 0.0).map(|(_, pattern)| pattern).collect();
         let mut changed = false;
-        for cause in worth_it.into_iter().map(Cause::Unknown) {
+        for cause in worth_it.into_iter().map(Candidate::Unknown) {
             if let Some(noise) = self.noise_with(&cause, RUNNING_ON_ROUNDS) {
                 changed = true;
                 for block in self.pool.add(&self.grid, self.rig, &[cause]) {
@@ -145,10 +147,10 @@ impl Engine<'_> {
         let found = self.best.as_ref().map(|m| m.fit.set.clone()).unwrap_or_default();
         let mut best: Option<(Pattern, f64)> = None;
         for _ in 0..3 {
-            let tried: Vec<Cause> = patterns.iter().cloned().map(Cause::Unknown).collect();
+            let tried: Vec<Candidate> = patterns.iter().cloned().map(Candidate::Unknown).collect();
             let Some(beside) = self.beside(&found, &tried) else { return false };
             for (block, gain) in &beside.gains {
-                if let Cause::Unknown(pattern) = &beside.pool.blocks[*block].cause
+                if let Candidate::Unknown(pattern) = &beside.pool.blocks[*block].cause
                     && best.as_ref().is_none_or(|(_, g)| gain > g)
                 {
                     best = Some((pattern.clone(), *gain));
@@ -159,11 +161,11 @@ impl Engine<'_> {
             step *= 0.5;
         }
         let Some((pattern, _)) = best else { return false };
-        self.add_and_weigh(&[Cause::Unknown(pattern)])
+        self.add_and_weigh(&[Candidate::Unknown(pattern)])
     }
 
     /// Adds events to the pool and weighs each; true where any could be added.
-    fn add_and_weigh(&mut self, events: &[Cause]) -> bool {
+    fn add_and_weigh(&mut self, events: &[Candidate]) -> bool {
         let added = self.pool.add(&self.grid, self.rig, events);
         for block in &added {
             if let Some(noise) = self.noise_with(&self.pool.blocks[*block].cause, 1) {
@@ -174,7 +176,7 @@ impl Engine<'_> {
     }
 
     /// What each of several causes would add to a set of blocks, in a pool of their own.
-    fn beside(&self, others: &[usize], tried: &[Cause]) -> Option<Beside> {
+    fn beside(&self, others: &[usize], tried: &[Candidate]) -> Option<Beside> {
         let mut pool = self.pool.only(&self.grid, others);
         let set: Vec<usize> = (0..others.len()).collect();
         let tried = pool.add(&self.grid, self.rig, tried);
@@ -186,7 +188,7 @@ impl Engine<'_> {
 
     /// Steps and tones pass for scatter until they are taken off: the noise that one leaves beside what does not move the level,
     /// where that alone comes near the best model.
-    fn noise_with(&self, event: &Cause, rounds: usize) -> Option<Noise> {
+    fn noise_with(&self, event: &Candidate, rounds: usize) -> Option<Noise> {
         let steady = self.steady_set();
         let best = self.best.as_ref()?;
         // In a pool of its own: most events that are none fail here.

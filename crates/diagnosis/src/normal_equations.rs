@@ -1,16 +1,16 @@
-//! Normal equations of a set of blocks: amplitudes, their covariance and the evidence under any prior variances.
+//! NormalEquations equations of a set of blocks: amplitudes, their covariance and the evidence under any prior variances.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
+use super::design_matrix::{Block, RESIDUAL, WIDE};
 use super::noise::Whitened;
-use super::pool::{Block, RESIDUAL, WIDE};
 
-/// Normal equations of a set, the columns of its widest block turned to where their part is diagonal: they then cost no more than a
+/// NormalEquations equations of a set, the columns of its widest block turned to where their part is diagonal: they then cost no more than a
 /// diagonal does, however often the scales are moved.
-pub(super) struct Normal {
+pub(super) struct NormalEquations {
     /// Columns of the set that are turned.
     wide: Range<usize>,
     basis: Option<Arc<SymmetricEigen<f64, Dyn>>>,
@@ -43,7 +43,7 @@ impl Solved {
     }
 }
 
-impl Normal {
+impl NormalEquations {
     /// Without a wide block.
     pub(super) fn dense(gram: DMatrix<f64>, rhs: DVector<f64>) -> Self {
         Self {

@@ -28,7 +28,7 @@ const FRAME_PERIOD: Duration = Duration::from_millis(10);
 const LONGEST_CATCH_UP_NS: u64 = 2_000_000_000;
 
 /// The simulated rig.
-pub struct World {
+pub struct SimulatedRig {
     plant: Plant,
     servo: ServoEmulator,
     brake: BrakeEmulator,
@@ -58,7 +58,7 @@ impl Default for Plug {
     }
 }
 
-impl World {
+impl SimulatedRig {
     /// A rig at rest.
     ///
     /// # Errors

@@ -5,12 +5,12 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
+use super::design_matrix::DesignMatrix;
+use super::design_matrix::{RESIDUAL, ZERO};
 use super::diagnosis::Gap;
 use super::gram;
 use super::grid::Grid;
 use super::noise::Noise;
-use super::pool::Pool;
-use super::pool::{RESIDUAL, ZERO};
 use super::waves::WAVES;
 
 /// Resamples of the revolutions for intervals.
@@ -59,7 +59,7 @@ impl Errors {
 impl HeldOut {
     /// Sums for these columns of the pool. Units are runs, or revolutions where there is one run.
     #[must_use]
-    pub fn new(grid: &Grid, pool: &Pool, noise: &Noise, columns: &[usize]) -> Self {
+    pub fn new(grid: &Grid, pool: &DesignMatrix, noise: &Noise, columns: &[usize]) -> Self {
         let mut all = vec![RESIDUAL, ZERO];
         all.extend(columns.iter().copied().filter(|c| *c != ZERO && *c != RESIDUAL));
         all.dedup();

@@ -10,7 +10,7 @@ use diagnosis::logs::{Logs, LogsError};
 
 /// Why there is no answer.
 #[derive(Debug, Error)]
-pub enum AskError {
+pub enum QueryError {
     /// It refused.
     #[error("{}: {source}", log.display())]
     Refused {
@@ -32,12 +32,13 @@ pub enum AskError {
 /// The diagnosis of a log, as `to_dict()` gives it; the pair is the one in the log. `exclude` names effects that it shall do without.
 ///
 /// # Errors
-/// [`AskError`] when there is no answer.
-pub fn diagnose(log: &Path, exclude: &[String]) -> Result<Value, AskError> {
+/// [`QueryError`] when there is no answer.
+pub fn diagnose(log: &Path, exclude: &[String]) -> Result<Value, QueryError> {
     let options = Options { known: Vec::new(), exclude: exclude.to_vec() };
     let diagnosed = Logs::open(&[log.to_owned()], None)
         .and_then(|logs| logs.diagnose(&options))
-        .map_err(|source| AskError::Refused { log: log.into(), source })?;
+        .map_err(|source| QueryError::Refused { log: log.into(), source })?;
     // By way of its text, as a reader of `--json` has it.
-    serde_json::from_str(&diagnosed.diagnosis.to_json()).map_err(|source| AskError::Answer { log: log.into(), source })
+    serde_json::from_str(&diagnosed.diagnosis.to_json())
+        .map_err(|source| QueryError::Answer { log: log.into(), source })
 }

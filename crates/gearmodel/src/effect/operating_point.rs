@@ -4,7 +4,7 @@ use super::Shaft;
 
 /// One place in a campaign.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Station {
+pub struct OperatingPoint {
     /// Driver angle θ1, rad.
     pub theta1_rad: f64,
     /// Standard deviation of the driver angles of the samples that it stands for, rad.
@@ -36,24 +36,24 @@ pub struct Station {
     /// Run's number.
     pub run: usize,
     /// Signed revolutions driven so far at each of the plan's loads.
-    pub ledger: Ledger,
+    pub revolutions_by_load: RevolutionsByLoad,
 }
 
 /// Most distinct loads whose revolutions are booked apart.
-pub const LEDGER_LOADS: usize = 8;
+pub const MOST_LOADS: usize = 8;
 
 /// Signed driver revolutions so far, by load: what carried-over slip is computed from.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Ledger {
+pub struct RevolutionsByLoad {
     /// Loads, N·m.
-    pub load_nm: [f64; LEDGER_LOADS],
+    pub load_nm: [f64; MOST_LOADS],
     /// Revolutions, ccw positive.
-    pub signed_rev: [f64; LEDGER_LOADS],
+    pub signed_rev: [f64; MOST_LOADS],
     /// Revolutions in either sense.
-    pub way_rev: [f64; LEDGER_LOADS],
+    pub way_rev: [f64; MOST_LOADS],
 }
 
-impl Station {
+impl OperatingPoint {
     /// Angle of a shaft, rad.
     #[must_use]
     pub fn angle_rad(&self, shaft: Shaft) -> f64 {
@@ -89,7 +89,7 @@ impl Station {
             time_s: self.time_s,
             way_rev: self.way_rev,
             run: self.run,
-            ledger: self.ledger,
+            revolutions_by_load: self.revolutions_by_load,
             ..*other
         };
     }
@@ -101,7 +101,7 @@ impl Station {
     }
 }
 
-/// How fine the trace of an effect is against the stretches of angle over which samples are averaged.
+/// How fine the trace of an effect is against the segments of angle over which samples are averaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grain {
     /// As good as constant over them: taken at their middle.

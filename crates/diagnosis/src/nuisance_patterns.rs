@@ -3,7 +3,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use gearmodel::effect::{Accumulates, Carrier, Parity, Plan, Shaft, Signature, Station};
+use gearmodel::effect::{Accumulates, Carrier, OperatingPoint, Parity, Plan, Shaft, Signature};
 
 /// Part of its turn that a shaft must cover for its orders to be tried.
 const LEAST_TURN: f64 = 0.9;
@@ -321,7 +321,7 @@ impl Pattern {
     }
 
     /// Values at a station.
-    pub fn row(&self, at: &Station, row: &mut [f64]) {
+    pub fn row(&self, at: &OperatingPoint, row: &mut [f64]) {
         let scale = |weight: Weight, mean: f64, odd: bool| {
             let size = match weight {
                 Weight::One => 1.0,

@@ -5,13 +5,13 @@ use std::f64::consts::TAU;
 
 use serde_json::json;
 
+use super::design_matrix::{Candidate, DesignMatrix};
 use super::diagnosis::{Curve, Location, Slice};
 use super::evidence::Fit;
 use super::grid::{Grid, nearest};
 use super::line_phase::LineError;
 use super::noise::Noise;
-use super::pool::{Cause, Pool};
-use gearmodel::effect::{Accumulates, Carrier, INTERPOLATION, Parity, Rig, Signature, Station, by_name};
+use gearmodel::effect::{Accumulates, Carrier, INTERPOLATION, OperatingPoint, Parity, Rig, Signature, by_name};
 
 /// Sectors of a turn.
 const SECTORS: usize = 36;
@@ -26,7 +26,7 @@ const TIMES: usize = 24;
 pub(super) struct Inputs<'a> {
     pub(super) rig: &'a Rig,
     pub(super) grid: &'a Grid,
-    pub(super) pool: &'a Pool,
+    pub(super) pool: &'a DesignMatrix,
     pub(super) noise: &'a Noise,
     pub(super) best: &'a Fit,
     pub(super) lines: &'a [LineError],
@@ -37,7 +37,8 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
     let Inputs { rig, grid, noise, best, lines, .. } = inputs;
     let zero = best.mean[0];
     let rest: Vec<f64> = grid.rho_rad.iter().map(|y| y - zero).collect();
-    let by = |key: &dyn Fn(&Station) -> Option<usize>, names: &[serde_json::Value]| slices(inputs, &rest, key, names);
+    let by =
+        |key: &dyn Fn(&OperatingPoint) -> Option<usize>, names: &[serde_json::Value]| slices(inputs, &rest, key, names);
     let sectors: Vec<_> = (0..SECTORS).map(|n| json!((n as f64 + 0.5) * 360.0 / SECTORS as f64)).collect();
     let sector = |angle_rad: f64| ((angle_rad / TAU).rem_euclid(1.0) * SECTORS as f64) as usize;
     let teeth = rig.pair().teeth().0 as usize;
@@ -46,7 +47,7 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
     let speeds: Vec<_> = grid.plan.speeds_rad_per_s.iter().map(|x| json!(x * 60.0 / TAU)).collect();
     let revolutions = (grid.plan.revolutions.ceil() as usize).clamp(1, 400);
     let times: Vec<_> = (0..TIMES).map(|n| json!((n as f64 + 0.5) * grid.plan.duration_s / TIMES as f64)).collect();
-    let time = |at: &Station| ((at.time_s / grid.plan.duration_s.max(1e-9)) * TIMES as f64) as usize;
+    let time = |at: &OperatingPoint| ((at.time_s / grid.plan.duration_s.max(1e-9)) * TIMES as f64) as usize;
     let floor_of_order = |n: usize| {
         let runs = grid.revolutions.len().max(1) as f64;
         let low = noise.order_rad2.get(n).copied().unwrap_or(0.0);
@@ -55,7 +56,7 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
             .sqrt()
             * std::f64::consts::SQRT_2
     };
-    let orders = |phase: &dyn Fn(&Station) -> f64, count: usize, mesh: bool| {
+    let orders = |phase: &dyn Fn(&OperatingPoint) -> f64, count: usize, mesh: bool| {
         (1..=count)
             .map(|n| {
                 let amplitude = amplitude(grid, &rest, &|at| n as f64 * phase(at));
@@ -95,7 +96,7 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
 fn slices(
     inputs: &Inputs<'_>,
     rest: &[f64],
-    key: &dyn Fn(&Station) -> Option<usize>,
+    key: &dyn Fn(&OperatingPoint) -> Option<usize>,
     names: &[serde_json::Value],
 ) -> Vec<Slice> {
     let (grid, noise) = (inputs.grid, inputs.noise);
@@ -120,7 +121,7 @@ fn slices(
 }
 
 /// Amplitude of the part of the residual that goes with sin and cos of a phase, by sense and combined, rad.
-fn amplitude(grid: &Grid, rest: &[f64], phase: &dyn Fn(&Station) -> f64) -> f64 {
+fn amplitude(grid: &Grid, rest: &[f64], phase: &dyn Fn(&OperatingPoint) -> f64) -> f64 {
     let mut sums = [[0.0; 3]; 2];
     for ((at, value), weight) in grid.places.iter().zip(rest).zip(&grid.weight) {
         let (sin, cos) = phase(at).sin_cos();
@@ -142,8 +143,8 @@ fn signature(inputs: &Inputs<'_>) -> Signature {
     for (n, b) in best.set.iter().enumerate() {
         let size = best.rms_rad(pool, n).powi(2);
         let row = match &pool.blocks[*b].cause {
-            Cause::Effect { effect, shape, .. } => effect.signature_of(rig, shape),
-            Cause::Unknown(pattern) => pattern.signature(),
+            Candidate::Effect { effect, shape, .. } => effect.signature_of(rig, shape),
+            Candidate::Unknown(pattern) => pattern.signature(),
         };
         if largest.as_ref().is_none_or(|(s, _)| size > *s) {
             largest = Some((size, row));
@@ -214,7 +215,7 @@ pub(super) fn warnings(grid: &Grid, noise: &Noise) -> Vec<String> {
 }
 
 /// Residual over the turn before and after, run by run.
-pub(super) fn curves(grid: &Grid, pool: &Pool, best: &Fit) -> Vec<Curve> {
+pub(super) fn curves(grid: &Grid, pool: &DesignMatrix, best: &Fit) -> Vec<Curve> {
     let zero = best.mean[0];
     let trace = pool.trace(grid, &best.amplitudes());
     let mut curves = Vec::new();

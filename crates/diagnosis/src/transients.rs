@@ -1,4 +1,4 @@
-//! Knocks against the rig, lost readings, bursts: short stretches that stand far out of the other revolutions at the same angle and
+//! Knocks against the rig, lost readings, bursts: short segments that stand far out of the other revolutions at the same angle and
 //! leave no step behind. No trace of angle, load or speed describes them, and as scatter they would drown everything else: they
 //! are cut out and reported.
 
@@ -18,7 +18,7 @@ const BESIDE: usize = 30;
 const STEP: f64 = 0.25;
 /// Times that they are looked for.
 const PASSES: usize = 4;
-/// Places from which a stretch at a run's beginning is no knock.
+/// Places from which a segment at a run's beginning is no knock.
 const SETTLING: usize = 20;
 /// Part of it on one side.
 const ONE_SIDED: f64 = 0.9;
@@ -88,7 +88,7 @@ fn share(cut: &[bool]) -> f64 {
     cut.iter().filter(|cut| **cut).count() as f64 / cut.len() as f64
 }
 
-/// A stretch that stands out.
+/// A segment that stands out.
 struct Window {
     places: std::ops::Range<usize>,
     begin_s: f64,
@@ -244,7 +244,7 @@ fn leaves_a_step(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gearmodel::effect::{Rig, Station};
+    use gearmodel::effect::{OperatingPoint, Rig};
 
     /// One run of four turns with the residual as given at (turn, bin).
     fn grid(rho: impl Fn(usize, usize) -> f64) -> Grid {
@@ -254,11 +254,11 @@ mod tests {
             &[],
         );
         grid.bins = bins;
-        grid.cells = vec![Station::default(); bins];
+        grid.cells = vec![OperatingPoint::default(); bins];
         grid.directions = vec![gearmodel::Direction::Ccw];
         for turn in 0..4 {
             for bin in 0..bins {
-                grid.places.push(Station { time_s: (turn * bins + bin) as f64, ..Station::default() });
+                grid.places.push(OperatingPoint { time_s: (turn * bins + bin) as f64, ..OperatingPoint::default() });
                 grid.cell_of.push(bin);
                 // Scatter of 1 µrad that repeats nowhere.
                 let scatter = 1e-6 * (((turn * bins + bin) * 7919 % 101) as f64 / 50.0 - 1.0);

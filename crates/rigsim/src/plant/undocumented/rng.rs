@@ -7,9 +7,9 @@ use std::f64::consts::TAU;
 
 /// A stream of random choices.
 #[derive(Debug, Clone)]
-pub struct Dice(Pcg64Mcg);
+pub struct FaultRng(Pcg64Mcg);
 
-impl Dice {
+impl FaultRng {
     /// The stream of a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
@@ -59,15 +59,15 @@ mod tests {
 
     #[test]
     fn draws_stay_in_their_ranges_and_reach_all_of_them() {
-        let mut dice = Dice::new(3);
+        let mut rng = FaultRng::new(3);
         let mut seen = [0usize; 5];
         for _ in 0..5000 {
-            seen[dice.below(5)] += 1;
-            assert!((2.0..3.0).contains(&dice.between(2.0, 3.0)));
-            assert!((1e-3..1.0).contains(&dice.spread(1e-3, 1.0)));
+            seen[rng.below(5)] += 1;
+            assert!((2.0..3.0).contains(&rng.between(2.0, 3.0)));
+            assert!((1e-3..1.0).contains(&rng.spread(1e-3, 1.0)));
         }
         assert!(seen.iter().all(|count| (900..1100).contains(count)), "{seen:?}");
-        let plus = (0..1000).filter(|_| dice.sign() > 0.0).count();
+        let plus = (0..1000).filter(|_| rng.sign() > 0.0).count();
         assert!((430..570).contains(&plus));
     }
 }
