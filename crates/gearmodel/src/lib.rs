@@ -23,6 +23,7 @@ pub mod effect;
 mod errors;
 mod flank;
 mod free;
+mod gear;
 mod geometry_error;
 pub mod increment;
 pub mod loaded;
@@ -40,12 +41,13 @@ pub mod sweep;
 #[cfg(doc)]
 pub mod theory;
 mod tip;
+mod tip_reach;
 pub mod tolerance;
 mod tooth_check;
 
 pub use direction::{Direction, ParseDirectionError};
 pub use errors::Errors;
-pub use flank::Gear;
+pub use gear::Gear;
 pub use geometry_error::GeometryError;
 pub use model::NominalModel;
 pub use outline::Outline;

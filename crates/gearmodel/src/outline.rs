@@ -7,7 +7,7 @@
 
 use std::fmt::Write as _;
 
-use crate::flank::Gear;
+use crate::gear::Gear;
 use crate::tip::{Tip, rising};
 use crate::{Direction, GearPair, GeometryError};
 

@@ -3,10 +3,10 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::{Arc, OnceLock};
 
-use crate::contact::Tips;
 use crate::geometry_error::{GeometryError, check_range, check_teeth};
 use crate::pitch_curve::{AnyCurve, Circle, Ellipse, PitchCurve};
 use crate::spec::{CircularSpec, EllipticalSpec, ToothSpec};
+use crate::tip_reach::Tips;
 
 /// How far a drawing may round the centre distance, mm: 145.0 for 144.9997 is rounding, 150 is another pair.
 pub const CENTRE_DISTANCE_ROUNDING_MM: f64 = 0.005;
@@ -343,9 +343,9 @@ impl GearPair {
         self.at(theta1_rad).mu_rad
     }
 
-    /// How far every flank reaches to its tip.
-    pub(crate) fn tips(&self) -> Arc<Tips> {
-        self.tips.0.get_or_init(|| Arc::new(Tips::of(self))).clone()
+    /// Where the reach of its flanks is kept once it was asked for.
+    pub(crate) fn kept_tips(&self) -> &OnceLock<Arc<Tips>> {
+        &self.tips.0
     }
 
     /// Angles, radii and inclination at θ1, evaluated once.

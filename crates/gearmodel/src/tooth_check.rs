@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::flank::Gear;
+use crate::gear::Gear;
 use crate::pitch_curve::{CELLS, refine};
 use crate::tip::rising;
 use crate::{Direction, GearPair, GeometryError, RollPoint};
