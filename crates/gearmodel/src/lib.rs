@@ -37,6 +37,7 @@ pub mod pitch_curve;
 pub mod recording;
 pub mod sensitivity;
 mod spec;
+mod stated;
 pub mod sweep;
 #[cfg(doc)]
 pub mod theory;

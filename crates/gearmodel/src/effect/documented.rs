@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Effect, Given, LIBRARY, OperatingPoint, Rig, Shaft, Shape, StatedEffect, StatedError, by_name};
+use super::{Effect, Fold, Given, LIBRARY, OperatingPoint, Rig, Shaft, Shape, StatedEffect, StatedError, by_name};
 use crate::{Errors, GearPair, GeometryError, NominalModel};
 
 /// An effect with its shape and amplitudes.
@@ -99,17 +99,6 @@ impl Term {
         }
         true
     }
-}
-
-/// Documented error that an effect is a change of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fold {
-    /// e and φ of a gear.
-    Eccentricity(Shaft),
-    /// Compliance of a shaft.
-    ShaftCompliance(Shaft),
-    /// Compliance of the mesh.
-    MeshCompliance,
 }
 
 /// The effects of a nominal model beyond its [`Errors`]; empty for most.

@@ -4,7 +4,7 @@
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
-    StatedEffect, StatedError, stated,
+    StatedEffect, StatedError,
 };
 
 /// Variation of the mesh compliance over the pitch.
@@ -90,7 +90,7 @@ impl Effect for MeshStiffnessVariation {
     }
 
     fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
-        let mut stated = stated::by_parameters(self, rig, shape, beta);
+        let mut stated = self.reported(rig, shape, beta);
         match shape[..] {
             [_, start] => stated.insert("start_pitches".to_owned(), Stated::Number(start)),
             // The tips of the teeth say where one pair carries.

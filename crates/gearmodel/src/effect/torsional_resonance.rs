@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, MeshOrders, OperatingPoint, Parameter, Parity, Plan, Rig, Rows, Shape,
-    Signature, Stated, StatedEffect, StatedError, stated,
+    Signature, Stated, StatedEffect, StatedError,
 };
 
 /// What excites it, as a file states it, and the kind that it is.
@@ -265,7 +265,7 @@ impl Effect for TorsionalResonance {
     }
 
     fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
-        let mut stated = stated::by_parameters(self, rig, shape, beta);
+        let mut stated = self.reported(rig, shape, beta);
         let kind = KINDS.iter().position(|kind| shape.first() == Some(kind)).unwrap_or(0);
         let word = EXCITED_BY[kind];
         stated.insert("excited_by".to_owned(), Stated::Text(word.to_owned()));
