@@ -170,7 +170,7 @@ mod tests {
 
     use super::*;
     use crate::effect::predict::{Condition, FoundEffect};
-    use crate::effect::{Estimate, Rig, Value};
+    use crate::effect::{Estimate, Value};
     use crate::{Direction, NominalModel};
 
     const PAIR: &str = "kind = \"elliptical\"\nmodule_mm = 3.0\nteeth = [47, 47]\neccentricity = 0.3287\n";
@@ -217,7 +217,7 @@ mod tests {
             let te = |model: &NominalModel, n: i32| model.te_under_rad(-0.0137 * f64::from(n), &under());
             assert!((0..500).any(|n| (te(&model, n) - te(&plain, n)).abs() > 1e-9), "{name} adds nothing");
             // Through amplitudes and back.
-            let rig = Rig::new(plain, [None, None], None);
+            let rig = plain.rig([None, None], None);
             let term = Term::from_stated(&rig, name, &file.effects[name][0]).unwrap();
             let again = Term::from_stated(&rig, name, &term.stated(&rig)).unwrap_or_else(|e| panic!("{name}: {e}"));
             assert_eq!((again.shape.len(), again.beta.len()), (term.shape.len(), term.beta.len()), "{name}");
@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn reported_parameters_that_may_be_stated_keep_their_names() {
-        let rig = Rig::new(PairFile::parse(PAIR).unwrap().model().unwrap(), [None, None], None);
+        let rig = PairFile::parse(PAIR).unwrap().model().unwrap().rig([None, None], None);
         for (name, table) in every_effect() {
             let file = PairFile::parse(&format!("{PAIR}{table}")).unwrap();
             let term = Term::from_stated(&rig, name, &file.effects[name][0]).unwrap();
@@ -285,7 +285,7 @@ mod tests {
     #[test]
     fn found_effects_are_added_to_what_is_documented() {
         let file = PairFile::parse(&format!("{PAIR}[documented.time_skew]\ndt_s = 1e-5\n")).unwrap();
-        let rig = Rig::new(file.model().unwrap(), [None, None], None);
+        let rig = file.model().unwrap().rig([None, None], None);
         let found = |name: &str, shape: Vec<f64>, beta: Vec<f64>| {
             let covariance = DMatrix::zeros(beta.len(), beta.len());
             FoundEffect { effect: by_name(name).unwrap(), shape, estimate: Estimate { beta, covariance } }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{Effect, Fold, Given, LIBRARY, OperatingPoint, Rig, Shaft, Shape, StatedEffect, StatedError, by_name};
-use crate::{Errors, GearPair, GeometryError, NominalModel};
+use crate::{Errors, GearPair, GeometryError};
 
 /// An effect with its shape and amplitudes.
 #[derive(Clone)]
@@ -131,7 +131,7 @@ impl Documented {
         if stated.is_empty() {
             return Ok(Self::default());
         }
-        let rig = |errors: Errors| Rig::new(NominalModel::bare(pair.clone(), errors), [None, None], None);
+        let rig = |errors: Errors| Rig::new(pair.clone(), errors, [None, None], None);
         let plain = rig(*errors);
         let mut terms = Vec::new();
         for (name, tables) in stated {
