@@ -1,7 +1,7 @@
 //! `pair.toml`: a pair and its documented errors as a file.
 
-#[path = "pair_file_documented.rs"]
 mod documented;
+mod found;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -246,15 +246,7 @@ impl PairFile {
                 line("centre_distance_mm", &centre_distance_mm);
             }
         }
-        let errors = &self.documented;
-        line("\n[documented]\ne1_mm", &errors.e1_mm);
-        line("phi1_rad", &errors.phi1_rad);
-        line("e2_mm", &errors.e2_mm);
-        line("phi2_rad", &errors.phi2_rad);
-        line("shaft_compliance_output_rad_per_nm", &errors.shaft_compliance_output_rad_per_nm);
-        line("shaft_compliance_input_rad_per_nm", &errors.shaft_compliance_input_rad_per_nm);
-        line("mesh_compliance_mm2_rad_per_nm", &errors.mesh_compliance_mm2_rad_per_nm);
-        documented::write(&mut text, &self.effects);
+        documented::write(&mut text, self.documented, &self.effects);
         text
     }
 }
