@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use super::{
     Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    Stated, StatedEffect, StatedError,
+    Stated, StatedEffect, StatedError, Words,
 };
 
 /// Stands for steps spread evenly over the way; times are not negative.
@@ -31,6 +31,13 @@ impl Effect for CountLoss {
 
     fn component(&self) -> &'static str {
         "acquisition"
+    }
+
+    fn words(&self) -> Words {
+        Words::new(
+            "lost counts at the output encoder",
+            "check cable, screen, supply and edge rate of the output encoder",
+        )
     }
 
     fn steps(&self) -> bool {

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Estimate, Grain, OperatingPoint, Parameter, Plan, Rig, Shaft, Signature};
+use super::{Estimate, Grain, OperatingPoint, Parameter, Plan, Rig, Shaft, Signature, Words};
 use crate::stated::{Given, StatedEffect, StatedError};
 
 /// Values of the parameters in which a trace is not linear; which they are, the effect knows. Empty where there are none.
@@ -29,6 +29,9 @@ pub trait Effect: Sync {
 
     /// Where on the rig it sits.
     fn component(&self) -> &'static str;
+
+    /// What it is called at the rig, and what to do about it.
+    fn words(&self) -> Words;
 
     /// How it shows.
     fn signature(&self) -> Signature;

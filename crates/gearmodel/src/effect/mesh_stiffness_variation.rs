@@ -4,7 +4,7 @@
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
-    StatedEffect, StatedError,
+    StatedEffect, StatedError, Words,
 };
 
 /// Variation of the mesh compliance over the pitch.
@@ -19,6 +19,13 @@ impl Effect for MeshStiffnessVariation {
 
     fn component(&self) -> &'static str {
         "gear teeth"
+    }
+
+    fn words(&self) -> Words {
+        Words::new(
+            "stiffness varying with the tooth mesh",
+            "nothing is loose: enter it in the model, or raise the contact ratio",
+        )
     }
 
     fn signature(&self) -> Signature {

@@ -1,8 +1,9 @@
 //! The effects that may stand between the nominal model and the rig, each linearised about the nominal pair.
 //!
 //! An effect is a block of columns over the samples' [`OperatingPoint`]s: its trace is columns · β, with amplitudes β in the
-//! effect's own units and, where the trace is not linear in a parameter, a [`Shape`] that the diagnosis searches on a grid. One
-//! effect = one file + one line in [`LIBRARY`]. Equations stand in the files; common symbols:
+//! effect's own units and, where the trace is not linear in a parameter, a [`Shape`] that the diagnosis searches on a grid. All
+//! that is known of one, its words for people included, stands in its own file; this one lists it, as a module and in [`LIBRARY`].
+//! Equations stand in the files; common symbols:
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -22,6 +23,7 @@ pub mod predict;
 mod rig;
 mod shaft;
 mod signature;
+mod words;
 
 // The effects.
 mod backlash_error;
@@ -59,6 +61,7 @@ pub use polar::Estimate;
 pub use rig::{MeshOrders, Rig};
 pub use shaft::Shaft;
 pub use signature::{Accumulates, Carrier, Parity, Signature};
+pub use words::Words;
 
 use encoder_disc::{EncoderDisc, Order};
 

@@ -4,7 +4,7 @@
 
 use super::{
     Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    Stated, StatedEffect, StatedError,
+    Stated, StatedEffect, StatedError, Words,
 };
 
 /// Error of the pitch curves' form or closure.
@@ -17,6 +17,10 @@ impl Effect for PitchCurveError {
 
     fn component(&self) -> &'static str {
         "gears"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("pitch curve off its nominal k", "check the gear's programme: k as cut against k in pair.toml")
     }
 
     fn signature(&self) -> Signature {

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, StatedError,
-    Value,
+    Value, Words,
 };
 
 /// Pitch errors of the driver's teeth, flank by flank.
@@ -61,6 +61,13 @@ impl Effect for PitchErrors {
 
     fn component(&self) -> &'static str {
         "gear teeth"
+    }
+
+    fn words(&self) -> Words {
+        Words::new(
+            "pitch errors of the teeth",
+            "measure the pitch of the worst teeth named and regrind or replace the gear",
+        )
     }
 
     fn signature(&self) -> Signature {

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    StatedError, Value,
+    StatedError, Value, Words,
 };
 
 /// One damaged tooth flank.
@@ -21,6 +21,10 @@ impl Effect for ToothDamage {
 
     fn component(&self) -> &'static str {
         "one tooth of gear 1, or its mate"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("damage to one tooth", "look at the tooth and flank named")
     }
 
     fn signature(&self) -> Signature {

@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, MeshOrders, OperatingPoint, Parameter, Parity, Plan, Rig, Rows, Shape,
-    Signature, Stated, StatedEffect, StatedError,
+    Signature, Stated, StatedEffect, StatedError, Words,
 };
 
 /// What excites it, as a file states it, and the kind that it is.
@@ -107,6 +107,10 @@ impl Effect for TorsionalResonance {
 
     fn component(&self) -> &'static str {
         "drive train"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("torsional resonance", "keep away from the speed that excites it, or stiffen the train")
     }
 
     fn signature(&self) -> Signature {

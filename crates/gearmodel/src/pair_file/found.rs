@@ -25,7 +25,7 @@ impl PairFile {
         let Some(rig) = &found.rig else { return Ok((file, left_out)) };
         for effect in &found.effects {
             let name = effect.effect.name();
-            if name == "count_loss" {
+            if effect.effect.steps() {
                 left_out.push(format!(
                     "{name}: counts were lost; when that happens again cannot be foreseen: see to the wiring"
                 ));

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // helpers of tests may
 
+mod library;
 mod ringing;
 mod signatures;
 
@@ -135,34 +136,6 @@ fn every_trace_is_finite_on_every_kind_of_pair() {
             }
         }
     }
-}
-
-#[test]
-fn a_drive_without_teeth_has_no_effects_of_teeth() {
-    let rig = rig(&GearPair::constant(101.0).unwrap());
-    let mut left_out: Vec<_> = LIBRARY.iter().filter(|e| !e.applies(&rig)).map(|e| e.name()).collect();
-    left_out.sort_unstable();
-    let mut expected = [
-        "bearing_compliance",
-        "centre_distance_error",
-        "gear1_eccentricity",
-        "gear2_eccentricity",
-        "mesh_compliance",
-        "mesh_stiffness_variation",
-        "pitch_errors",
-        "profile_error",
-        "thermal_drift",
-        "tooth_damage",
-        "wear_drift",
-    ];
-    expected.sort_unstable();
-    assert_eq!(left_out, expected);
-    // r2 = 1 mm and α = 0 stand in: a play of 1 mm along the normal is 1 rad.
-    let at = operating_point(&rig, 0.3, Direction::Ccw);
-    assert!((row(&rig, "bearing_clearance", &[], &at)[0] + 1.0).abs() < 1e-15);
-    assert!((row(&rig, "backlash_error", &[], &at)[0] + 0.5).abs() < 1e-15);
-    let stiff = Rig::new(rig.pair().clone(), Errors::default(), [None; 2], None);
-    assert_eq!(row(&stiff, "friction_windup", &[], &at), [-1.0]);
 }
 
 fn estimate(beta: Vec<f64>) -> Estimate {
