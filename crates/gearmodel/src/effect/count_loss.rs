@@ -72,7 +72,7 @@ impl Effect for CountLoss {
             if let Some(counts_per_rev) = rig.output_counts_per_rev {
                 // Counts are lost at least one at a time.
                 let count_rad = TAU / counts_per_rev;
-                parameters.push(Parameter::grid("counts", -rate_rad.signum(), "counts"));
+                parameters.push(Parameter::derived("counts", -rate_rad.signum(), "counts"));
                 parameters.push(Parameter::number("per_rev", rate_rad.abs() / count_rad, std_rad / count_rad, "1/rev"));
             }
             parameters.push(Parameter::number("rate_rad_per_rev", rate_rad, std_rad, "rad/rev"));

@@ -74,11 +74,11 @@ impl Effect for MeshStiffnessVariation {
     }
 
     fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
-        let duty = shape.first().copied().unwrap_or_else(|| rig.mean_single_pair_duty());
-        vec![
-            Parameter::number("c_mm2_rad_per_nm", found.beta[0], found.std(0), "mm2.rad/(N.m)"),
-            Parameter::grid("duty", duty, ""),
-        ]
+        let duty = match shape.first() {
+            Some(duty) => Parameter::grid("duty", *duty, ""),
+            None => Parameter::derived("duty", rig.mean_single_pair_duty(), ""),
+        };
+        vec![Parameter::number("c_mm2_rad_per_nm", found.beta[0], found.std(0), "mm2.rad/(N.m)"), duty]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -56,7 +56,7 @@ pub use definition::{Effect, Fold, Rows, Shape};
 pub use documented::{Documented, Term};
 pub use encoder_interpolation::NAMES as INTERPOLATION;
 pub use operating_point::{Grain, MOST_LOADS, OperatingPoint, Plan, RevolutionsByLoad};
-pub use parameter::{Parameter, Value};
+pub use parameter::{Parameter, ParameterKind, Value};
 pub use polar::Estimate;
 pub use rig::{MeshOrders, Rig};
 pub use shaft::Shaft;

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    StatedError, Value, Words,
+    StatedError, Words,
 };
 
 /// One damaged tooth flank.
@@ -83,12 +83,7 @@ impl Effect for ToothDamage {
             Parameter::grid("tooth", tooth, ""),
             Parameter::number("depth_mm", found.beta[0], found.std(0), "mm"),
             Parameter::grid("width", width, "pitches"),
-            Parameter {
-                name: "flank",
-                value: Value::Text(if flank > 0.0 { "ccw" } else { "cw" }),
-                std: None,
-                unit: "",
-            },
+            Parameter::word("flank", if flank > 0.0 { "ccw" } else { "cw" }),
         ]
     }
 

@@ -9,7 +9,7 @@ mod signatures;
 use std::f64::consts::TAU;
 
 use gearmodel::contact::{ContactModel, Profile, ToothDamage, ToothErrors};
-use gearmodel::effect::{Estimate, LIBRARY, OperatingPoint, Plan, Rig, Value, by_name};
+use gearmodel::effect::{Estimate, LIBRARY, OperatingPoint, ParameterKind, Plan, Rig, Value, by_name};
 use gearmodel::increment::common_normal;
 use gearmodel::{CircularSpec, CurveSpec, Direction, EllipticalSpec, Errors, GearPair, NominalModel, ToothSpec};
 use nalgebra::DMatrix;
@@ -132,7 +132,13 @@ fn every_trace_is_finite_on_every_kind_of_pair() {
                     assert!(values.iter().all(|x| x.is_finite()), "{} {shape:?} on {}", effect.name(), pair.kind());
                 }
                 let found = estimate(vec![1e-3; effect.width(&rig, &shape)]);
-                assert!(!effect.parameters(&rig, &shape, &found).is_empty());
+                let parameters = effect.parameters(&rig, &shape, &found);
+                assert!(!parameters.is_empty());
+                for parameter in parameters {
+                    let fitted_number =
+                        parameter.kind == ParameterKind::Fitted && matches!(parameter.value, Value::Number(_));
+                    assert_eq!(parameter.std.is_some(), fitted_number, "{} of {}", parameter.name, effect.name());
+                }
             }
         }
     }
