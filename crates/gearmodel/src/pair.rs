@@ -134,8 +134,7 @@ impl GearPair {
     /// # Errors
     /// [`GeometryError`] for a number outside its range, unequal tooth numbers, or a centre distance that does not close.
     pub fn elliptical(spec: &EllipticalSpec) -> Result<Self, GeometryError> {
-        let data = spec.teeth_and_sizes();
-        data.check()?;
+        spec.teeth.check()?;
         check_range(
             "eccentricity",
             spec.eccentricity,
@@ -143,20 +142,20 @@ impl GearPair {
             (0.0, crate::pitch_curve::MAX_ECCENTRICITY),
             "k is the ellipse's linear eccentricity over its semi-major axis",
         )?;
-        let (teeth1, teeth2) = spec.teeth;
+        let (teeth1, teeth2) = spec.teeth.teeth;
         if teeth1 != teeth2 {
             let needed = f64::from(teeth1);
             return Err(GeometryError::TeethRatio { kind: "elliptical", teeth1, teeth2, needed });
         }
         let ellipse = Ellipse::new(spec.eccentricity);
         // Tooth condition: perimeter = π m Z1 fixes the scale, and with it the centre distance that closes.
-        let closing_mm = PI * spec.module_mm * f64::from(teeth1) / ellipse.arc(TAU);
-        if let Some(given_mm) = spec.centre_distance_mm {
+        let closing_mm = PI * spec.teeth.module_mm * f64::from(teeth1) / ellipse.arc(TAU);
+        if let Some(given_mm) = spec.teeth.centre_distance_mm {
             check_centre_distance(given_mm, closing_mm, 1.0, (ellipse.radius_range().1, 0.0), |distance| {
                 ellipse.closure_at(distance)
             })?;
         }
-        data.pair(ellipse.into(), closing_mm)
+        spec.teeth.pair(ellipse.into(), closing_mm)
     }
 
     /// Circular gears.

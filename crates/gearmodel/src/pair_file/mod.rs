@@ -38,7 +38,7 @@ impl PairSpec {
     /// Kind as in the file, and the teeth where the kind has them.
     fn teeth(&self) -> (&'static str, Option<ToothSpec>) {
         match self {
-            Self::Elliptical(spec) => ("elliptical", Some(spec.teeth_and_sizes())),
+            Self::Elliptical(spec) => ("elliptical", Some(spec.teeth.clone())),
             Self::Circular(teeth) => ("circular", Some(teeth.clone())),
             Self::Free { teeth, curve } => (curve.kind(), Some(teeth.clone())),
             Self::Constant { .. } => ("constant", None),
@@ -298,7 +298,7 @@ impl RawFile {
             },
             _ => {
                 let eccentricity = need(kind, "eccentricity", self.eccentricity)?;
-                return Ok(PairSpec::Elliptical(teeth.with_eccentricity(eccentricity)));
+                return Ok(PairSpec::Elliptical(EllipticalSpec { teeth, eccentricity }));
             }
         };
         Ok(PairSpec::Free { teeth, curve })

@@ -213,8 +213,13 @@ fn displaced_gears_are_those_of_exact_contact() {
 fn thinner_teeth_are_those_of_exact_contact() {
     let dj_mm = 0.01;
     type Build<'a> = &'a dyn Fn(f64) -> GearPair;
-    let ellipse: Build =
-        &|backlash_mm| GearPair::elliptical(&EllipticalSpec { backlash_mm, ..Default::default() }).unwrap();
+    let ellipse: Build = &|backlash_mm| {
+        GearPair::elliptical(&EllipticalSpec {
+            teeth: ToothSpec { backlash_mm, ..Default::default() },
+            ..Default::default()
+        })
+        .unwrap()
+    };
     let circles: Build = &|backlash_mm| {
         GearPair::circular(&CircularSpec { teeth: (23, 47), backlash_mm, ..Default::default() }).unwrap()
     };
@@ -384,7 +389,11 @@ fn a_profile_is_that_of_exact_contact_on_either_flank() {
 fn a_damaged_tooth_lags_while_it_alone_carries_as_in_exact_contact() {
     let (depth_mm, width) = (5e-4, 0.3);
     // Low teeth: one pair alone over 0.8 of a pitch, so that nothing hides the damage.
-    let ellipse = GearPair::elliptical(&EllipticalSpec { addendum: 0.6, ..Default::default() }).unwrap();
+    let ellipse = GearPair::elliptical(&EllipticalSpec {
+        teeth: ToothSpec { addendum: 0.6, ..Default::default() },
+        ..Default::default()
+    })
+    .unwrap();
     let circles = GearPair::circular(&CircularSpec { teeth: (23, 47), addendum: 0.6, ..Default::default() }).unwrap();
     for pair in [ellipse, circles] {
         let rig = rig(&pair);
