@@ -12,7 +12,6 @@ use std::{
 };
 
 use gearmodel::NominalModel;
-use gearmodel::effect::Rig;
 use riglog::{
     EncoderMetadata, LogError, LogParts, RunSpan, RunStream, RunTotals, RunVisitor, SampleBlock, StreamTotals,
 };
@@ -94,16 +93,16 @@ impl CampaignLogs {
         self.logs.iter().find_map(|(_, log)| log.metadata()).map(|run| run.backend.clone()).unwrap_or_default()
     }
 
-    /// The rig of a nominal model with the encoders that the logs name.
+    /// A nominal model with the encoders that the logs name.
     #[must_use]
-    pub fn rig(&self, model: NominalModel) -> Rig {
+    pub fn nominal(&self, model: NominalModel) -> Nominal {
         let encoders = self.logs.iter().find_map(|(_, log)| log.encoders());
         // As many lines as counts: a table that was imported, of whose discs nothing is known.
         let known = |lines: u64, counts: u64| (lines > 1 && lines < counts).then_some(lines as f64);
         let lines = encoders.map_or([None, None], |e: &EncoderMetadata| {
             [known(e.input_lines, e.input_counts_per_rev), known(e.output_lines, e.output_counts_per_rev)]
         });
-        Rig::new(model, lines, encoders.map(|e| e.output_counts_per_rev as f64))
+        Nominal::new(model, lines, encoders.map(|e| e.output_counts_per_rev as f64))
     }
 
     /// Reads all samples once and gives the runs as points.

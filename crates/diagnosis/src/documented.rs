@@ -10,7 +10,7 @@ impl Nominal {
     /// Takes the documented effects off runs that are in order of time and share one clock: what slipped, wore or warmed in
     /// one run stays in the next.
     pub fn take_off_effects(&self, runs: &mut [ReducedRun]) {
-        let effects = &self.rig().model().effects;
+        let effects = &self.model().effects;
         let Some(rig) = effects.rig() else { return };
         let terms: Vec<&Term> = effects.terms().iter().filter(|term| !carried_by_line(term)).collect();
         let start_s = runs.iter().filter_map(|run| run.points.first()).map(|p| p.time_s).fold(f64::INFINITY, f64::min);

@@ -135,7 +135,7 @@ pub fn diagnose_with_nominal(
             .map(|lines| lines as f64)
     });
     let quantum = recordings.iter().find_map(|r| interpolation::counts_per_rev(&r.columns().theta2_rad));
-    let mut nominal = Nominal::new(Rig::new(model.clone(), lines, quantum));
+    let mut nominal = Nominal::new(model.clone(), lines, quantum);
     let parts: Vec<Recording<'_>> = recordings.iter().flat_map(Recording::split).collect();
     let lines = interpolation::search_lines(&parts, &nominal, lines);
     nominal.set_lines(lines);

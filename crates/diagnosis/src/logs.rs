@@ -84,7 +84,7 @@ impl Logs {
                     .map_err(|source| LogsError::Pair { path: path.to_owned(), source })?
             }
         };
-        let nominal = Nominal::new(logs.rig(model));
+        let nominal = logs.nominal(model);
         Ok(Self { logs, pair, nominal, notes })
     }
 

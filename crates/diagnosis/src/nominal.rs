@@ -2,29 +2,31 @@
 
 use std::f64::consts::TAU;
 
-use gearmodel::Direction;
 use gearmodel::contact::ContactModel;
 use gearmodel::effect::predict::Condition;
 use gearmodel::effect::{Carrier, Rig, Term};
 use gearmodel::increment::common_normal;
+use gearmodel::{Direction, NominalModel};
 
 /// Angles a turn at which exact contact is tabulated against the first order.
 const STEPS: usize = 1440;
 
-/// The rig's model with a table of what exact contact adds to the first order.
+/// The nominal model with a table of what exact contact adds to the first order.
 #[derive(Clone, Debug)]
 pub struct Nominal {
+    model: NominalModel,
     rig: Rig,
     /// Exact less first-order TE over a turn of the driver, rad, ccw then cw; empty where it cannot be tabulated.
     correction_rad: [Vec<f64>; 2],
 }
 
 impl Nominal {
-    /// Tabulates exact contact where the driven gear closes with the driver's turn; elsewhere the first order stands.
+    /// Tabulates exact contact where the driven gear closes with the driver's turn; elsewhere the first order stands. `lines` are
+    /// those of the input and of the output encoder, where known.
     #[must_use]
-    pub fn new(rig: Rig) -> Self {
-        let pair = rig.pair();
-        let errors = rig.model().errors;
+    pub fn new(model: NominalModel, lines: [Option<f64>; 2], output_counts_per_rev: Option<f64>) -> Self {
+        let pair = &model.pair;
+        let errors = model.errors;
         let closes = (pair.closure() - pair.closure().round()).abs() < 1e-12;
         let displaced = errors.e1_mm != 0.0 || errors.e2_mm != 0.0;
         let exact =
@@ -40,10 +42,17 @@ impl Nominal {
                 })
                 .collect()
         });
-        Self { rig, correction_rad }
+        let rig = model.rig(lines, output_counts_per_rev);
+        Self { model, rig, correction_rad }
     }
 
-    /// The rig.
+    /// The nominal model.
+    #[must_use]
+    pub fn model(&self) -> &NominalModel {
+        &self.model
+    }
+
+    /// The rig that effects are linearised about.
     #[must_use]
     pub fn rig(&self) -> &Rig {
         &self.rig
@@ -65,18 +74,19 @@ impl Nominal {
             let (low, part) = (place as usize % STEPS, place.fract());
             table[low] + part * (table[(low + 1) % STEPS] - table[low])
         };
-        let model = self.rig.model();
+        let model = &self.model;
         model.te_at_rad(&model.pair.at(theta1_rad), direction, load_nm) + correction_rad
     }
+
     /// Nominal TE with its documented effects, rad.
     #[must_use]
     pub fn te_under_rad(&self, theta1_rad: f64, under: &Condition) -> f64 {
-        self.te_rad(theta1_rad, under.direction, under.load_nm) + self.rig.model().effects_te_rad(theta1_rad, under)
+        self.te_rad(theta1_rad, under.direction, under.load_nm) + self.model.effects_te_rad(theta1_rad, under)
     }
 
     /// Documented sub-divisional errors of the encoders, which are taken off sample by sample.
     pub(super) fn line_errors(&self) -> impl Iterator<Item = &Term> {
-        self.rig.model().effects.terms().iter().filter(|term| carried_by_line(term))
+        self.model.effects.terms().iter().filter(|term| carried_by_line(term))
     }
 }
 

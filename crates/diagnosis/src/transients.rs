@@ -249,10 +249,7 @@ mod tests {
     /// One run of four turns with the residual as given at (turn, bin).
     fn grid(rho: impl Fn(usize, usize) -> f64) -> Grid {
         let bins = 100;
-        let mut grid = Grid::new(
-            &Rig::new(gearmodel::NominalModel::new(pair(), gearmodel::Errors::default()).unwrap(), [None, None], None),
-            &[],
-        );
+        let mut grid = Grid::new(&Rig::new(pair(), gearmodel::Errors::default(), [None, None], None), &[]);
         grid.bins = bins;
         grid.cells = vec![OperatingPoint::default(); bins];
         grid.directions = vec![gearmodel::Direction::Ccw];

@@ -174,7 +174,6 @@ pub fn verify(nominal: &Nominal, mut runs: Vec<ReducedRun>) -> Option<Verified> 
 mod tests {
     use super::*;
     use crate::reduce::{Reducer, Sample};
-    use gearmodel::effect::Rig;
     use gearmodel::{Direction, PairFile};
 
     const PAIR: &str = "kind = \"elliptical\"\nmodule_mm = 3.0\nteeth = [47, 47]\neccentricity = 0.3287\n";
@@ -182,7 +181,7 @@ mod tests {
     /// Four revolutions each way with an output reading error, per sample, as a function of θ2, time and revolutions.
     fn against(model: &str, extra: impl Fn(f64, f64, f64) -> f64) -> Verified {
         let model = PairFile::parse(&format!("{PAIR}{model}")).unwrap().model().unwrap();
-        let nominal = Nominal::new(Rig::new(model, [None, None], None));
+        let nominal = Nominal::new(model, [None, None], None);
         let mut runs = Vec::new();
         let (mut time_s, mut way_rev) = (0.0, 0.0);
         for direction in Direction::BOTH {

@@ -8,7 +8,7 @@ use diagnosis::grid::Grid;
 use diagnosis::reduce::{Point, ReducedRun};
 
 use gearmodel::effect::{Estimate, OperatingPoint, Rig, Value, by_name};
-use gearmodel::{Direction, EllipticalSpec, Errors, GearPair, NominalModel};
+use gearmodel::{Direction, EllipticalSpec, Errors, GearPair};
 use nalgebra::DMatrix;
 
 /// (start s, sense, load N·m, revolutions): pauses, and loads that come back.
@@ -22,7 +22,7 @@ const RUNS: [(f64, Direction, f64, f64); 5] = [
 
 fn document_rig() -> Rig {
     let pair = GearPair::elliptical(&EllipticalSpec::default()).unwrap();
-    Rig::new(NominalModel::new(pair, Errors::default()).unwrap(), [None, None], Some(7.2e6))
+    Rig::new(pair, Errors::default(), [None, None], Some(7.2e6))
 }
 
 fn row(rig: &Rig, name: &str, shape: &[f64], at: &OperatingPoint) -> Vec<f64> {

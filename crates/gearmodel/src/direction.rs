@@ -29,6 +29,15 @@ impl Direction {
         }
     }
 
+    /// 0 for [`Direction::Ccw`], 1 for [`Direction::Cw`]: the order of all tables by flank.
+    #[inline]
+    pub(crate) fn index(self) -> usize {
+        match self {
+            Self::Ccw => 0,
+            Self::Cw => 1,
+        }
+    }
+
     /// The other sense.
     #[must_use]
     pub fn reversed(self) -> Self {

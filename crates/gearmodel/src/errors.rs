@@ -1,5 +1,7 @@
 //! Documented errors of a pair: what the nominal model already contains.
 
+use std::f64::consts::FRAC_PI_2;
+
 use serde::{Deserialize, Serialize};
 
 use crate::GeometryError;
@@ -31,6 +33,26 @@ pub struct Errors {
 const MAX_ECCENTRICITY_MM: f64 = 100.0;
 
 impl Errors {
+    /// A perfect, rigid pair.
+    pub const NONE: Self = Self {
+        e1_mm: 0.0,
+        phi1_rad: 0.0,
+        e2_mm: 0.0,
+        phi2_rad: 0.0,
+        shaft_compliance_output_rad_per_nm: 0.0,
+        shaft_compliance_input_rad_per_nm: 0.0,
+        mesh_compliance_mm2_rad_per_nm: 0.0,
+    };
+
+    /// Eccentricities of 1 mm along both axes, gear 1's then gear 2's: TE to first order is a sum of what they make, e cos φ times
+    /// the first and e sin φ times the second of each gear.
+    pub(crate) const UNIT_ECCENTRICITIES: [Self; 4] = [
+        Self { e1_mm: 1.0, ..Self::NONE },
+        Self { e1_mm: 1.0, phi1_rad: FRAC_PI_2, ..Self::NONE },
+        Self { e2_mm: 1.0, ..Self::NONE },
+        Self { e2_mm: 1.0, phi2_rad: FRAC_PI_2, ..Self::NONE },
+    ];
+
     /// Passes errors that are finite, with lengths and compliances that are not negative.
     ///
     /// # Errors

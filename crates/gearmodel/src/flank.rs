@@ -10,27 +10,8 @@
 //!
 //! Sources: F. L. Litvin and A. Fuentes, Gear Geometry and Applied Theory, ch. 12 (non-circular gears).
 
+use crate::gear::Gear;
 use crate::{Direction, GearPair, RollPoint};
-
-/// Which gear of the pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Gear {
-    /// Gear 1, at the origin.
-    Driver,
-    /// Gear 2, at (a, 0).
-    Driven,
-}
-
-impl Gear {
-    /// 1 or 2.
-    #[must_use]
-    pub fn number(self) -> u8 {
-        match self {
-            Self::Driver => 1,
-            Self::Driven => 2,
-        }
-    }
-}
 
 impl GearPair {
     /// Where the rack's flank at offset `d_mm` touches both gears, mm in the fixed frame of the rolling pitch curves.

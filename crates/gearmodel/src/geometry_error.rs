@@ -32,7 +32,7 @@ pub enum GeometryError {
 
     /// A documented effect that does not fit the pair or is not fixed by its parameters.
     #[error("documented {0}")]
-    Documented(#[from] crate::effect::StatedError),
+    Documented(#[from] crate::stated::StatedError),
 
     /// A tooth number outside the limits.
     #[error("gear {gear} has {teeth} teeth: {lower} to {upper} are accepted")]

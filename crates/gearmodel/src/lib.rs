@@ -12,9 +12,19 @@
 //! - [`Direction`] names the driver's sense of rotation and with it the active flank. TE of both senses is counted in the
 //!   same positive sense of θ2, so that backlash = TE_cw − TE_ccw at equal θ1.
 //!
-//! Reading order: [`pitch_curve`] → [`GearPair`] → [`increment`] → [`NominalModel`] (the model, first order) → [`contact`] (the
-//! model, exact) → [`loaded`]; [`recording`] → [`measure`] (the measurement) → [`effect`], [`gap`] (what stands between the
-//! two). The theory stands in [`theory`], page by page.
+//! Reading order, which is the order of the layers: no module uses one that stands after it.
+//!
+//! | layer | modules |
+//! |---|---|
+//! | names and plain data | [`Direction`], [`Gear`], the specs ([`ToothSpec`] …), what a file states of an effect ([`effect::Stated`]) |
+//! | what can be wrong with numbers | [`GeometryError`], [`Errors`] |
+//! | the pair | [`pitch_curve`] → [`GearPair`], free curves → flanks → tips → tooth check → [`Outline`] |
+//! | the errors of a pair | [`increment`] (first order), [`contact`] (exact), [`loaded`], [`phase`] |
+//! | what stands between model and rig | [`effect`]: the rig → what an effect is → the effects → their list → documented ones |
+//! | the nominal model | [`NominalModel`] → [`sensitivity`], [`tolerance`]; [`PairFile`] → [`sweep`] |
+//! | the measurement | [`measure`] → [`recording`], [`calibration`] |
+//!
+//! What is inferred from measurements stands in the crate `diagnosis`. The theory stands in [`theory`], page by page.
 
 pub mod calibration;
 pub mod contact;
@@ -23,6 +33,7 @@ pub mod effect;
 mod errors;
 mod flank;
 mod free;
+mod gear;
 mod geometry_error;
 pub mod increment;
 pub mod loaded;
@@ -36,16 +47,18 @@ pub mod pitch_curve;
 pub mod recording;
 pub mod sensitivity;
 mod spec;
+mod stated;
 pub mod sweep;
 #[cfg(doc)]
 pub mod theory;
 mod tip;
+mod tip_reach;
 pub mod tolerance;
 mod tooth_check;
 
 pub use direction::{Direction, ParseDirectionError};
 pub use errors::Errors;
-pub use flank::Gear;
+pub use gear::Gear;
 pub use geometry_error::GeometryError;
 pub use model::NominalModel;
 pub use outline::Outline;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::effect::predict::Condition;
-use crate::effect::{Documented, StatedEffect};
+use crate::effect::{Documented, Rig, StatedEffect};
 use crate::increment::common_normal;
 use crate::{Direction, Errors, GearPair, GeometryError, MeshPoint};
 
@@ -25,7 +25,7 @@ impl NominalModel {
     /// [`GeometryError`] when an error is not finite or a length or compliance is negative.
     pub fn new(pair: GearPair, errors: Errors) -> Result<Self, GeometryError> {
         errors.check()?;
-        Ok(Self::bare(pair, errors))
+        Ok(Self { pair, errors, effects: Documented::default() })
     }
 
     /// A pair with documented errors, and effects by name and parameters; those that are changes of an error go there.
@@ -44,10 +44,10 @@ impl NominalModel {
         Ok(Self { pair, errors, effects })
     }
 
-    /// A model of errors that were checked before, and no effects.
+    /// The rig that effects are linearised about: this pair with its documented errors, and the encoders as far as they are known.
     #[must_use]
-    pub fn bare(pair: GearPair, errors: Errors) -> Self {
-        Self { pair, errors, effects: Documented::default() }
+    pub fn rig(&self, lines: [Option<f64>; 2], output_counts_per_rev: Option<f64>) -> Rig {
+        Rig::new(self.pair.clone(), self.errors, lines, output_counts_per_rev)
     }
 
     /// Predicted TE at θ1, rad: eccentricities and designed backlash along the common normal, the wind-up under

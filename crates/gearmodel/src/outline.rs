@@ -7,7 +7,7 @@
 
 use std::fmt::Write as _;
 
-use crate::flank::Gear;
+use crate::gear::Gear;
 use crate::tip::{Tip, rising};
 use crate::{Direction, GearPair, GeometryError};
 
@@ -247,7 +247,7 @@ mod tests {
 
     use super::*;
     use crate::flank::rotate;
-    use crate::{CircularSpec, EllipticalSpec};
+    use crate::{CircularSpec, EllipticalSpec, ToothSpec};
 
     #[test]
     fn a_circular_outline_has_its_radii_and_thickness() {
@@ -286,8 +286,11 @@ mod tests {
 
     #[test]
     fn the_gears_run_without_cutting_into_each_other() {
-        let pair =
-            GearPair::elliptical(&EllipticalSpec { eccentricity: 0.4, teeth: (36, 36), ..Default::default() }).unwrap();
+        let pair = GearPair::elliptical(&EllipticalSpec {
+            eccentricity: 0.4,
+            teeth: ToothSpec { teeth: (36, 36), ..Default::default() },
+        })
+        .unwrap();
         let driver = pair.outline(Gear::Driver, 120).unwrap();
         let driven = pair.outline(Gear::Driven, 120).unwrap();
         let a = pair.centre_distance_mm();
@@ -310,7 +313,11 @@ mod tests {
 
     #[test]
     fn exports_hold_every_point() {
-        let pair = GearPair::elliptical(&EllipticalSpec { backlash_mm: 0.1, ..Default::default() }).unwrap();
+        let pair = GearPair::elliptical(&EllipticalSpec {
+            teeth: ToothSpec { backlash_mm: 0.1, ..Default::default() },
+            ..Default::default()
+        })
+        .unwrap();
         let outline = pair.outline(Gear::Driven, 40).unwrap();
         assert_eq!(outline.to_dxf("gear 2").matches("VERTEX").count(), outline.points_mm.len());
         assert_eq!(outline.to_svg().matches(" L").count(), outline.points_mm.len() - 1);

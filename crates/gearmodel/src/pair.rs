@@ -3,10 +3,10 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::{Arc, OnceLock};
 
-use crate::contact::Tips;
 use crate::geometry_error::{GeometryError, check_range, check_teeth};
 use crate::pitch_curve::{AnyCurve, Circle, Ellipse, PitchCurve};
 use crate::spec::{CircularSpec, EllipticalSpec, ToothSpec};
+use crate::tip_reach::Tips;
 
 /// How far a drawing may round the centre distance, mm: 145.0 for 144.9997 is rounding, 150 is another pair.
 pub const CENTRE_DISTANCE_ROUNDING_MM: f64 = 0.005;
@@ -134,8 +134,7 @@ impl GearPair {
     /// # Errors
     /// [`GeometryError`] for a number outside its range, unequal tooth numbers, or a centre distance that does not close.
     pub fn elliptical(spec: &EllipticalSpec) -> Result<Self, GeometryError> {
-        let data = spec.teeth_and_sizes();
-        data.check()?;
+        spec.teeth.check()?;
         check_range(
             "eccentricity",
             spec.eccentricity,
@@ -143,20 +142,20 @@ impl GearPair {
             (0.0, crate::pitch_curve::MAX_ECCENTRICITY),
             "k is the ellipse's linear eccentricity over its semi-major axis",
         )?;
-        let (teeth1, teeth2) = spec.teeth;
+        let (teeth1, teeth2) = spec.teeth.teeth;
         if teeth1 != teeth2 {
             let needed = f64::from(teeth1);
             return Err(GeometryError::TeethRatio { kind: "elliptical", teeth1, teeth2, needed });
         }
         let ellipse = Ellipse::new(spec.eccentricity);
         // Tooth condition: perimeter = π m Z1 fixes the scale, and with it the centre distance that closes.
-        let closing_mm = PI * spec.module_mm * f64::from(teeth1) / ellipse.arc(TAU);
-        if let Some(given_mm) = spec.centre_distance_mm {
+        let closing_mm = PI * spec.teeth.module_mm * f64::from(teeth1) / ellipse.arc(TAU);
+        if let Some(given_mm) = spec.teeth.centre_distance_mm {
             check_centre_distance(given_mm, closing_mm, 1.0, (ellipse.radius_range().1, 0.0), |distance| {
                 ellipse.closure_at(distance)
             })?;
         }
-        data.pair(ellipse.into(), closing_mm)
+        spec.teeth.pair(ellipse.into(), closing_mm)
     }
 
     /// Circular gears.
@@ -343,9 +342,9 @@ impl GearPair {
         self.at(theta1_rad).mu_rad
     }
 
-    /// How far every flank reaches to its tip.
-    pub(crate) fn tips(&self) -> Arc<Tips> {
-        self.tips.0.get_or_init(|| Arc::new(Tips::of(self))).clone()
+    /// Where the reach of its flanks is kept once it was asked for.
+    pub(crate) fn kept_tips(&self) -> &OnceLock<Arc<Tips>> {
+        &self.tips.0
     }
 
     /// Angles, radii and inclination at θ1, evaluated once.

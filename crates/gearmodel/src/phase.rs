@@ -78,25 +78,11 @@ impl PhaseStudy {
     /// [`GeometryError`] when an error is out of range.
     pub fn new(pair: &GearPair, errors: &Errors, objective: PhaseObjective) -> Result<Self, GeometryError> {
         errors.check()?;
-        let unit = |e1_mm: f64, phi1_rad: f64, e2_mm: f64, phi2_rad: f64| Errors {
-            e1_mm,
-            phi1_rad,
-            e2_mm,
-            phi2_rad,
-            ..Errors::default()
-        };
-        // sin lags cos by a quarter turn: e (cos φ, sin φ) = (0, 1) at φ = π/2.
-        let units = [
-            unit(1.0, 0.0, 0.0, 0.0),
-            unit(1.0, 0.5 * PI, 0.0, 0.0),
-            unit(0.0, 0.0, 1.0, 0.0),
-            unit(0.0, 0.0, 1.0, 0.5 * PI),
-        ];
         let curve = |value: &dyn Fn(&Errors, f64) -> f64| -> Vec<[f64; 4]> {
             (0..ANGLES)
                 .map(|n| {
                     let theta1_rad = TAU * f64::from(n) / f64::from(ANGLES);
-                    units.map(|errors| value(&errors, theta1_rad))
+                    Errors::UNIT_ECCENTRICITIES.map(|errors| value(&errors, theta1_rad))
                 })
                 .collect()
         };
@@ -214,15 +200,7 @@ mod tests {
     use super::*;
     use crate::{CircularSpec, EllipticalSpec};
 
-    const EQUAL: Errors = Errors {
-        e1_mm: 0.05,
-        phi1_rad: 0.0,
-        e2_mm: 0.05,
-        phi2_rad: 0.0,
-        shaft_compliance_output_rad_per_nm: 0.0,
-        shaft_compliance_input_rad_per_nm: 0.0,
-        mesh_compliance_mm2_rad_per_nm: 0.0,
-    };
+    const EQUAL: Errors = Errors { e1_mm: 0.05, e2_mm: 0.05, ..Errors::NONE };
 
     #[test]
     fn table_of_the_backlash_over_phases() {

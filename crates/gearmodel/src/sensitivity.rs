@@ -200,7 +200,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::{CurveSpec, Errors, GearPair, ToothSpec};
+    use crate::{CurveSpec, EllipticalSpec, Errors, GearPair, ToothSpec};
 
     /// Teeth, eccentricity, and the lobes of a lobed pair.
     type Spec = (ToothSpec, f64, Option<(u32, u32)>);
@@ -208,7 +208,7 @@ mod tests {
     fn pair((teeth, eccentricity, lobes): &Spec) -> GearPair {
         let eccentricity = *eccentricity;
         match *lobes {
-            None => GearPair::elliptical(&teeth.with_eccentricity(eccentricity)).unwrap(),
+            None => GearPair::elliptical(&EllipticalSpec { teeth: teeth.clone(), eccentricity }).unwrap(),
             Some(lobes) => GearPair::free(teeth, &CurveSpec::Lobed { eccentricity, lobes }).unwrap(),
         }
     }

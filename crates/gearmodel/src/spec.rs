@@ -1,46 +1,20 @@
 //! What a drawing says about a pair, before it is checked.
 
-use serde::{Deserialize, Serialize};
-
 /// A pair of identical elliptic gears, each turning about a focus.
 ///
 /// The tooth condition (perimeter = π m Z) fixes the size of the ellipse; closure fixes the centre distance.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct EllipticalSpec {
-    /// Module m, mm.
-    pub module_mm: f64,
-    /// Teeth of the driver and of the driven gear; a simple elliptic pair needs equal numbers.
-    pub teeth: (u32, u32),
+    /// Teeth and sizes; a simple elliptic pair needs equal numbers of teeth.
+    pub teeth: ToothSpec,
     /// Eccentricity k of the pitch ellipse, 0 (circle) to below 1.
     pub eccentricity: f64,
-    /// Pressure angle α of the rack, deg.
-    pub pressure_angle_deg: f64,
-    /// Centre distance of the drawing, mm; checked against closure, `None` = the one that closes.
-    pub centre_distance_mm: Option<f64>,
-    /// Designed backlash of both gears together along the pitch curve, mm.
-    pub backlash_mm: f64,
-    /// Face width, mm.
-    pub face_width_mm: f64,
-    /// Addendum in modules.
-    pub addendum: f64,
-    /// Clearance of the dedendum over the mate's addendum, in modules.
-    pub dedendum_clearance: f64,
 }
 
 impl Default for EllipticalSpec {
-    /// m = 3 mm, 47 teeth, k = 0.3287, α = 20°, no backlash: the pair of the source document.
+    /// The usual teeth with k = 0.3287: the pair of the source document.
     fn default() -> Self {
-        Self {
-            module_mm: 3.0,
-            teeth: (47, 47),
-            eccentricity: 0.3287,
-            pressure_angle_deg: 20.0,
-            centre_distance_mm: None,
-            backlash_mm: 0.0,
-            face_width_mm: 30.0,
-            addendum: 1.0,
-            dedendum_clearance: 0.25,
-        }
+        Self { teeth: ToothSpec::default(), eccentricity: 0.3287 }
     }
 }
 
@@ -48,7 +22,7 @@ impl Default for EllipticalSpec {
 pub type CircularSpec = ToothSpec;
 
 /// Teeth and sizes of a pair, whatever its pitch curve.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ToothSpec {
     /// Module m, mm.
     pub module_mm: f64,
@@ -85,7 +59,7 @@ impl Default for ToothSpec {
 }
 
 /// A free pitch curve of the driver; the tooth condition scales it, closure fixes its mate.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum CurveSpec {
     /// Ellipses of higher order, r1 = p/(1 − k cos n1 θ1), n1 lobes driving n2; the teeth stand in the same ratio.
     Lobed {
@@ -115,41 +89,6 @@ pub enum CurveSpec {
         /// Sine amplitudes from order 1.
         sines: Vec<f64>,
     },
-}
-
-impl ToothSpec {
-    /// The elliptical pair of these teeth.
-    #[must_use]
-    pub fn with_eccentricity(&self, eccentricity: f64) -> EllipticalSpec {
-        EllipticalSpec {
-            module_mm: self.module_mm,
-            teeth: self.teeth,
-            eccentricity,
-            pressure_angle_deg: self.pressure_angle_deg,
-            centre_distance_mm: self.centre_distance_mm,
-            backlash_mm: self.backlash_mm,
-            face_width_mm: self.face_width_mm,
-            addendum: self.addendum,
-            dedendum_clearance: self.dedendum_clearance,
-        }
-    }
-}
-
-impl EllipticalSpec {
-    /// Teeth and sizes, whatever the pitch curve.
-    #[must_use]
-    pub fn teeth_and_sizes(&self) -> ToothSpec {
-        ToothSpec {
-            module_mm: self.module_mm,
-            teeth: self.teeth,
-            pressure_angle_deg: self.pressure_angle_deg,
-            centre_distance_mm: self.centre_distance_mm,
-            backlash_mm: self.backlash_mm,
-            face_width_mm: self.face_width_mm,
-            addendum: self.addendum,
-            dedendum_clearance: self.dedendum_clearance,
-        }
-    }
 }
 
 impl CurveSpec {

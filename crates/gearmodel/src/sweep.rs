@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::contact::ContactModel;
 use crate::increment::common_normal;
 use crate::sensitivity::Parameter;
-use crate::{CurveSpec, Direction, Errors, GeometryError, NominalModel, PairSpec, ToothSpec};
+use crate::{CurveSpec, Direction, EllipticalSpec, Errors, GeometryError, NominalModel, PairSpec, ToothSpec};
 
 /// Figure of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -70,7 +70,7 @@ impl PairSpec {
         if let (Self::Circular(spec), Parameter::Eccentricity) = (&*self, parameter)
             && spec.teeth.0 == spec.teeth.1
         {
-            *self = Self::Elliptical(spec.with_eccentricity(0.0));
+            *self = Self::Elliptical(EllipticalSpec { teeth: spec.clone(), eccentricity: 0.0 });
         }
         let foreign = GeometryError::ForeignParameter { parameter: parameter.name(), kind: self.kind() };
         // What changes the size of the gears changes the distance at which they close.
@@ -88,8 +88,9 @@ impl PairSpec {
             teeth
         };
         match self {
-            Self::Elliptical(spec) => *spec = changed(spec.teeth_and_sizes()).with_eccentricity(spec.eccentricity),
-            Self::Circular(teeth) | Self::Free { teeth, .. } => *teeth = changed(teeth.clone()),
+            Self::Elliptical(EllipticalSpec { teeth, .. }) | Self::Circular(teeth) | Self::Free { teeth, .. } => {
+                *teeth = changed(teeth.clone());
+            }
             Self::Constant { .. } => {}
         }
         match (parameter, self) {
@@ -246,7 +247,6 @@ impl Sweep {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::EllipticalSpec;
 
     #[test]
     fn every_kind_of_pair_sweeps_what_it_has() {

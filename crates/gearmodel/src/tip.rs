@@ -4,8 +4,10 @@
 //! not at the rolling position that generates it.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
-use crate::flank::Gear;
+use crate::gear::Gear;
+use crate::tip_reach::Tips;
 use crate::{Direction, GearPair};
 
 /// The end of a flank.
@@ -72,5 +74,45 @@ impl GearPair {
             (high, at_high) = (middle, at_middle);
         }
         Tip { reach_mm: high, foot_rad }
+    }
+
+    /// How far every flank reaches to its tip: found when first asked for, and kept with the pair.
+    pub(crate) fn tips(&self) -> Arc<Tips> {
+        self.kept_tips().get_or_init(|| Arc::new(reach(self))).clone()
+    }
+}
+
+/// Reach of every flank of a pair; empty without teeth.
+fn reach(pair: &GearPair) -> Tips {
+    let pitch_mm = pair.pitch_mm().unwrap_or(f64::NAN);
+    let thinning_mm = 0.25 * pair.backlash_mm();
+    let (z1, z2) = pair.teeth();
+    let reaches = |gear: Gear, teeth: u32| {
+        Direction::BOTH.map(|side| (0..teeth).map(|tooth| pair.tip_of(gear, i64::from(tooth), side).reach_mm).collect())
+    };
+    let driver_mm: [Vec<f64>; 2] = reaches(Gear::Driver, z1);
+    let driven_mm: [Vec<f64>; 2] = reaches(Gear::Driven, z2);
+    let longest_mm = driver_mm.iter().chain(&driven_mm).flatten().copied().fold(0.0, f64::max);
+    Tips { pitch_mm, thinning_mm, driver_mm, driven_mm, longest_mm }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::CircularSpec;
+
+    #[test]
+    fn reach_of_a_circular_gear_is_that_of_its_tip_circle() {
+        let pair = GearPair::circular(&CircularSpec { teeth: (23, 47), ..Default::default() }).unwrap();
+        let tips = pair.tips();
+        let alpha = pair.pressure_angle_rad();
+        for (table, teeth) in [(&tips.driver_mm, 23.0), (&tips.driven_mm, 47.0)] {
+            let (radius, base, tip) = (1.5 * teeth, 1.5 * teeth * alpha.cos(), 1.5 * teeth + 3.0);
+            // Length of the line of action from the pitch point to the tip circle is d cos α.
+            let expected = ((tip * tip - base * base).sqrt() - radius * alpha.sin()) / alpha.cos();
+            for reach in table.iter().flatten() {
+                assert!((reach - expected).abs() < 1e-8, "{reach} {expected}");
+            }
+        }
     }
 }

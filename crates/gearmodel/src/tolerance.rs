@@ -117,26 +117,12 @@ struct Basis {
 impl Basis {
     fn of(model: &NominalModel, angles: usize, load_nm: f64) -> Self {
         let pair = &model.pair;
-        let quarter = 0.25 * TAU;
-        let unit = |e1_mm: f64, phi1_rad: f64, e2_mm: f64, phi2_rad: f64| Errors {
-            e1_mm,
-            phi1_rad,
-            e2_mm,
-            phi2_rad,
-            ..Errors::default()
-        };
-        let vectors = [
-            unit(1.0, 0.0, 0.0, 0.0),
-            unit(1.0, quarter, 0.0, 0.0),
-            unit(0.0, 0.0, 1.0, 0.0),
-            unit(0.0, 0.0, 1.0, quarter),
-        ];
         let te = Direction::BOTH.map(|direction| {
             let sign = direction.sign();
             let mut curves: [Vec<f64>; BASIS] = std::array::from_fn(|_| Vec::with_capacity(angles));
             for n in 0..angles {
                 let at = pair.at(TAU * n as f64 / angles as f64);
-                for (curve, errors) in curves.iter_mut().zip(&vectors) {
+                for (curve, errors) in curves.iter_mut().zip(&Errors::UNIT_ECCENTRICITIES) {
                     curve.push(common_normal::eccentricity_te_rad(pair, errors, &at, direction));
                 }
                 let arm_mm = common_normal::driven_base_arm_mm(pair, &at, direction);
@@ -360,10 +346,14 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::{EllipticalSpec, GearPair};
+    use crate::{EllipticalSpec, GearPair, ToothSpec};
 
     fn model() -> NominalModel {
-        let pair = GearPair::elliptical(&EllipticalSpec { backlash_mm: 0.1, ..Default::default() }).unwrap();
+        let pair = GearPair::elliptical(&EllipticalSpec {
+            teeth: ToothSpec { backlash_mm: 0.1, ..Default::default() },
+            ..Default::default()
+        })
+        .unwrap();
         NominalModel::new(pair, Errors { e1_mm: 0.02, phi1_rad: 0.4, ..Default::default() }).unwrap()
     }
 

@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::flank::Gear;
+use crate::gear::Gear;
 use crate::pitch_curve::{CELLS, refine};
 use crate::tip::rising;
 use crate::{Direction, GearPair, GeometryError, RollPoint};
@@ -146,7 +146,7 @@ mod tests {
         let pair = GearPair::circular(&CircularSpec { teeth: (40, 17), ..Default::default() }).unwrap();
         assert!(matches!(pair.check_teeth(), Err(GeometryError::Undercut { gear: 2, .. })));
 
-        let spec = EllipticalSpec { eccentricity: 0.7, teeth: (17, 17), ..Default::default() };
+        let spec = EllipticalSpec { eccentricity: 0.7, teeth: ToothSpec { teeth: (17, 17), ..Default::default() } };
         let error = GearPair::elliptical(&spec).unwrap().check_teeth().unwrap_err();
         let GeometryError::Undercut { theta1_rad, radius_mm, limit_mm, .. } = error else { panic!("{error:?}") };
         assert!((theta1_rad.sin()).abs() < 1e-6 && radius_mm < limit_mm);
@@ -190,7 +190,10 @@ mod tests {
 
     #[test]
     fn all_faults_are_told_and_the_first_is_the_error() {
-        let spec = EllipticalSpec { eccentricity: 0.7, teeth: (17, 17), addendum: 1.3, ..Default::default() };
+        let spec = EllipticalSpec {
+            eccentricity: 0.7,
+            teeth: ToothSpec { teeth: (17, 17), addendum: 1.3, ..Default::default() },
+        };
         let pair = GearPair::elliptical(&spec).unwrap();
         let faults = pair.tooth_faults();
         assert_eq!(pair.check_teeth().err().as_ref(), faults.first());

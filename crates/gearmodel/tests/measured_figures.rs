@@ -5,12 +5,16 @@
 use std::f64::consts::TAU;
 
 use gearmodel::measure::{AngleGrid, BacklashCurve, RunConditions, RunFigures, RunTe, common_zero};
-use gearmodel::{Direction, EllipticalSpec, Errors, GearPair, NominalModel};
+use gearmodel::{Direction, EllipticalSpec, Errors, GearPair, NominalModel, ToothSpec};
 
 const LOAD_NM: f64 = 10.0;
 
 fn model() -> NominalModel {
-    let pair = GearPair::elliptical(&EllipticalSpec { backlash_mm: 0.08, ..Default::default() }).unwrap();
+    let pair = GearPair::elliptical(&EllipticalSpec {
+        teeth: ToothSpec { backlash_mm: 0.08, ..Default::default() },
+        ..Default::default()
+    })
+    .unwrap();
     let errors = Errors {
         e1_mm: 0.05,
         phi1_rad: 0.3,

@@ -5,19 +5,21 @@
 use std::f64::consts::{PI, TAU};
 
 use gearmodel::increment::common_normal;
-use gearmodel::{CircularSpec, Direction, EllipticalSpec, Errors, GearPair, NominalModel, PairFile};
+use gearmodel::{CircularSpec, Direction, EllipticalSpec, Errors, GearPair, NominalModel, PairFile, ToothSpec};
 use proptest::prelude::*;
 
 fn any_pair() -> impl Strategy<Value = GearPair> {
     (0.0..0.85_f64, 17_u32..80, 0.5..8.0_f64, 14.5..25.0_f64, 0.0..0.3_f64).prop_map(
         |(k, teeth, module, alpha, backlash)| {
             GearPair::elliptical(&EllipticalSpec {
-                module_mm: module,
-                teeth: (teeth, teeth),
                 eccentricity: k,
-                pressure_angle_deg: alpha,
-                backlash_mm: backlash,
-                ..Default::default()
+                teeth: ToothSpec {
+                    module_mm: module,
+                    teeth: (teeth, teeth),
+                    pressure_angle_deg: alpha,
+                    backlash_mm: backlash,
+                    ..Default::default()
+                },
             })
             .unwrap()
         },
@@ -133,7 +135,8 @@ proptest! {
 
     #[test]
     fn a_round_ellipse_is_a_circle(teeth in 17_u32..80, k in 0.0..1e-9_f64, theta in -7.0..7.0_f64, errors in any_errors()) {
-        let ellipse = GearPair::elliptical(&EllipticalSpec { teeth: (teeth, teeth), eccentricity: k, ..Default::default() }).unwrap();
+        let equal = ToothSpec { teeth: (teeth, teeth), ..Default::default() };
+        let ellipse = GearPair::elliptical(&EllipticalSpec { eccentricity: k, teeth: equal }).unwrap();
         let circle = GearPair::circular(&CircularSpec { teeth: (teeth, teeth), ..Default::default() }).unwrap();
         prop_assert!((ellipse.theta2(theta) - circle.theta2(theta)).abs() <= 3.0 * k + 1e-14);
         for direction in Direction::BOTH {
@@ -151,18 +154,14 @@ proptest! {
     ) {
         let teeth = if same { (teeth.0, teeth.0) } else { teeth };
         let (backlash_mm, face_width_mm, addendum, dedendum_clearance) = if sane { (0.0, 30.0, 1.0, 0.25) } else { rest };
-        let spec = EllipticalSpec {
-            module_mm, teeth, eccentricity, pressure_angle_deg, centre_distance_mm: distance, backlash_mm, face_width_mm,
-            addendum, dedendum_clearance,
-        };
-        match GearPair::elliptical(&spec) {
-            Ok(pair) => assert_finite(&pair),
-            Err(error) => prop_assert!(!error.to_string().is_empty()),
-        }
-        let spec = CircularSpec {
+        let spec = ToothSpec {
             module_mm, teeth, pressure_angle_deg, centre_distance_mm: distance, backlash_mm, face_width_mm, addendum,
             dedendum_clearance,
         };
+        match GearPair::elliptical(&EllipticalSpec { teeth: spec.clone(), eccentricity }) {
+            Ok(pair) => assert_finite(&pair),
+            Err(error) => prop_assert!(!error.to_string().is_empty()),
+        }
         if let Ok(pair) = GearPair::circular(&spec) {
             assert_finite(&pair);
         }

@@ -121,7 +121,7 @@ pub fn diagnose_logs(
     let options = Options { known, exclude };
     py.detach(|| {
         let logs = CampaignLogs::open(&paths)?;
-        let nominal = diagnosis::Nominal::new(logs.rig(model));
+        let nominal = logs.nominal(model);
         let reduced = logs.reduce(&nominal)?;
         let incomplete = reduced.incomplete();
         let diagnosis = diagnosis::diagnose_runs(&nominal, reduced.runs, &options)?;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use gearmodel::sensitivity::Parameter;
 use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
 use pyo3::{PyErr, create_exception};
 
@@ -291,5 +292,12 @@ fn os_error(source: &std::io::Error, text: String) -> PyErr {
     match source.raw_os_error() {
         Some(number) => PyOSError::new_err((number, text)),
         None => PyErr::from(std::io::Error::new(source.kind(), text)),
+    }
+}
+
+impl InputError {
+    /// A name that is none of the model's parameters.
+    pub fn unknown_parameter(given: &str) -> Self {
+        Self::Parameter { given: given.to_owned(), known: Parameter::ALL.map(Parameter::name).join(", ") }
     }
 }

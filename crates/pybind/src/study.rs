@@ -21,9 +21,7 @@ fn parameter(name: &str) -> Result<(Parameter, f64)> {
     if name == "pressure_angle_deg" {
         return Ok((Parameter::PressureAngleRad, 1_f64.to_radians()));
     }
-    let known = || Parameter::ALL.map(Parameter::name).join(", ");
-    let found =
-        Parameter::from_name(name).ok_or_else(|| InputError::Parameter { given: name.to_owned(), known: known() })?;
+    let found = Parameter::from_name(name).ok_or_else(|| InputError::unknown_parameter(name))?;
     Ok((found, 1.0))
 }
 

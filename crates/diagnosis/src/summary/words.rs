@@ -1,128 +1,7 @@
 //! Plain words for the rig's people: what an effect is called, what to do about it, and what a signature says.
 
 use crate::diagnosis::{Diagnosis, Verdict};
-use gearmodel::effect::{Accumulates, Carrier, Parity, Signature};
-
-/// Name, plain words, and what to do about it on the rig.
-const EFFECTS: &[(&str, &str, &str)] = &[
-    (
-        "gear1_eccentricity",
-        "eccentricity of gear 1",
-        "measure gear 1's run-out on its shaft and re-centre it, or enter the vector in pair.toml",
-    ),
-    (
-        "gear2_eccentricity",
-        "eccentricity of gear 2",
-        "measure gear 2's run-out on its shaft and re-centre it, or enter the vector in pair.toml",
-    ),
-    (
-        "centre_distance_error",
-        "centre distance off its nominal value",
-        "measure the centre distance and re-shim the housing",
-    ),
-    (
-        "backlash_error",
-        "backlash off its documented value",
-        "check tooth thickness with a feeler or over pins and correct backlash_mm in pair.toml",
-    ),
-    (
-        "pitch_curve_error",
-        "pitch curve off its nominal k",
-        "check the gear's programme: k as cut against k in pair.toml",
-    ),
-    (
-        "phasing_error",
-        "clocking of gear 1 against the index",
-        "clock gear 1 to the encoder's index again, or enter the angle",
-    ),
-    (
-        "pitch_errors",
-        "pitch errors of the teeth",
-        "measure the pitch of the worst teeth named and regrind or replace the gear",
-    ),
-    (
-        "profile_error",
-        "profile error of the flanks",
-        "measure the flank profile; the same form at every tooth points to the tool",
-    ),
-    ("tooth_damage", "damage to one tooth", "look at the tooth and flank named"),
-    (
-        "encoder1_eccentricity",
-        "eccentricity of the input encoder",
-        "re-centre the input encoder's disc, or read it with two heads",
-    ),
-    (
-        "encoder2_eccentricity",
-        "eccentricity of the output encoder",
-        "re-centre the output encoder's disc, or read it with two heads",
-    ),
-    (
-        "encoder1_ellipticity",
-        "ellipticity of the input encoder",
-        "loosen the input encoder's disc or hub: a clamped disc goes oval",
-    ),
-    (
-        "encoder2_ellipticity",
-        "ellipticity of the output encoder",
-        "loosen the output encoder's disc or hub: a clamped disc goes oval",
-    ),
-    (
-        "encoder1_interpolation",
-        "interpolation error of the input encoder",
-        "adjust offset, gain and phase of the input encoder's sine signals",
-    ),
-    (
-        "encoder2_interpolation",
-        "interpolation error of the output encoder",
-        "adjust offset, gain and phase of the output encoder's sine signals",
-    ),
-    ("coupling_misalignment_input", "misalignment of the input coupling", "align the input shaft's coupling"),
-    ("coupling_misalignment_output", "misalignment of the output coupling", "align the output shaft's coupling"),
-    ("time_skew", "time skew between the channels", "latch both encoders with one strobe, or correct the delay"),
-    (
-        "count_loss",
-        "lost counts at the output encoder",
-        "check cable, screen, supply and edge rate of the output encoder",
-    ),
-    (
-        "shaft_compliance_input",
-        "wind-up of the input shaft",
-        "stiffen the input side, or enter its compliance in pair.toml",
-    ),
-    (
-        "shaft_compliance_output",
-        "wind-up of the output shaft",
-        "stiffen the output side, or enter its compliance in pair.toml",
-    ),
-    ("mesh_compliance", "compliance of the mesh", "enter the compliance in pair.toml: teeth do give way"),
-    ("bearing_compliance", "compliance of the bearings", "preload or stiffen the bearings, or enter their compliance"),
-    (
-        "mesh_stiffness_variation",
-        "stiffness varying with the tooth mesh",
-        "nothing is loose: enter it in the model, or raise the contact ratio",
-    ),
-    ("bearing_clearance", "clearance in the bearings", "preload or replace the bearings"),
-    ("friction_windup", "wind-up by friction", "free seals and bearings that drag"),
-    ("slip", "slip under load", "tighten the clamp or coupling that slips: mark both sides with a line and load it"),
-    (
-        "brake_torque_ripple",
-        "torque ripple of the brake",
-        "record the torque beside the angle, or use a smoother brake",
-    ),
-    ("torsional_resonance", "torsional resonance", "keep away from the speed that excites it, or stiffen the train"),
-    ("thermal_drift", "thermal drift of the centre distance", "warm up before measuring, or hold the temperature"),
-    ("wear_drift", "wear growing with revolutions", "check lubrication and the flanks; repeat an early run to see it"),
-];
-
-/// Families that differ in the shaft alone: both names, and what they share.
-const FAMILIES: &[(&str, &str, &str)] = &[
-    ("encoder1_eccentricity", "encoder2_eccentricity", "encoder eccentricity, input or output"),
-    ("encoder1_ellipticity", "encoder2_ellipticity", "encoder ellipticity, input or output"),
-    ("encoder1_interpolation", "encoder2_interpolation", "encoder interpolation, input or output"),
-    ("gear1_eccentricity", "gear2_eccentricity", "gear eccentricity, gear 1 or gear 2"),
-    ("coupling_misalignment_input", "coupling_misalignment_output", "coupling misalignment, input or output"),
-    ("shaft_compliance_input", "shaft_compliance_output", "shaft wind-up, input or output"),
-];
+use gearmodel::effect::{Accumulates, Carrier, Parity, Signature, by_name};
 
 /// An effect in plain words; a name outside the library stays as it is.
 #[must_use]
@@ -130,31 +9,27 @@ pub fn plain(name: &str) -> &str {
     if name == "unknown" {
         return "something outside the library";
     }
-    EFFECTS.iter().find(|(n, _, _)| *n == name).map_or(name, |(_, words, _)| words)
+    by_name(name).map_or(name, |effect| effect.words().plain_name)
 }
 
 /// What to do about an effect.
 #[must_use]
 pub fn remedy(name: &str) -> Option<&'static str> {
-    EFFECTS.iter().find(|(n, _, _)| *n == name).map(|(_, _, action)| *action)
+    by_name(name).map(|effect| effect.words().remedy)
 }
 
-/// A group in plain words.
+/// A group in plain words; two members that differ in the shaft alone are named once.
 #[must_use]
 pub fn group(members: &[String]) -> String {
-    let has = |name: &str| members.iter().any(|m| m == name);
-    let mut words = Vec::new();
-    let mut done: Vec<&str> = Vec::new();
+    let family = |member: &String| by_name(member).and_then(|effect| effect.words().family);
+    let mut words: Vec<&str> = Vec::new();
     for member in members {
-        if done.contains(&member.as_str()) {
-            continue;
-        }
-        match FAMILIES.iter().find(|(a, b, _)| (member == a || member == b) && has(a) && has(b)) {
-            Some((a, b, shared)) => {
-                done.extend([*a, *b]);
-                words.push((*shared).to_owned());
-            }
-            None => words.push(plain(member).to_owned()),
+        let shared =
+            family(member).filter(|own| members.iter().filter(|other| family(other) == Some(*own)).count() > 1);
+        match shared {
+            Some(shared) if words.contains(&shared) => {}
+            Some(shared) => words.push(shared),
+            None => words.push(plain(member)),
         }
     }
     words.join(", or ")
@@ -334,7 +209,6 @@ mod tests {
             assert!(remedy(effect.name()).is_some(), "{}", effect.name());
             assert_ne!(plain(effect.name()), effect.name());
         }
-        assert_eq!(EFFECTS.len(), LIBRARY.len());
     }
 
     #[test]

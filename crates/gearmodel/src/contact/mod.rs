@@ -19,76 +19,28 @@
 //! solved by Newton from the nominal position. The tooth's number cancels in d: without tooth errors ε every pair in
 //! contact gives the same ψ2. ψ2 of the running pair is the largest over the pairs in the contact zone when driving ccw,
 //! the smallest when driving cw.
-
 //!
 //! Where the lead ε changes along the flank, the flanks touch not at the nominal point but where ε reaches furthest over the
 //! opening gap: ε is replaced by max over u' of ε(u') − q (u' − u)², q the relative curvature of the two flanks.
 
 mod curve;
+mod error;
 mod series;
 mod solve;
 mod tooth_errors;
 mod zone;
 
+pub use error::ContactError;
 pub use tooth_errors::{Profile, ToothDamage, ToothErrors};
 
 use std::sync::Arc;
 
 use solve::{Displacement, Touch};
-pub(crate) use zone::Tips;
 
 use crate::geometry_error::check_range;
 use crate::increment::common_normal;
+use crate::tip_reach::Tips;
 use crate::{Direction, Errors, GearPair, GeometryError};
-
-/// Why a pair has no exact contact at an angle.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ContactError {
-    /// A drive of constant ratio has no teeth to touch.
-    #[error("a constant-ratio drive has no known teeth: use method common_normal")]
-    NoTeeth,
-    /// The contact equations have no solution near the nominal position.
-    #[error(
-        "no tooth contact near theta1 = {theta1_rad} rad ({direction}): the residual stays at {residual_mm:e} mm; the \
-         displacements are too large for these teeth"
-    )]
-    NotConverged {
-        /// Driver angle, rad.
-        theta1_rad: f64,
-        /// Sense.
-        direction: Direction,
-        /// Residual after the last step, mm.
-        residual_mm: f64,
-    },
-    /// Between two tooth pairs nothing touches.
-    #[error(
-        "no tooth pair is within its tips at theta1 = {theta1_rad} rad ({direction}): the contact ratio falls below 1 \
-         there; give the teeth a larger addendum or a smaller pressure angle"
-    )]
-    NoPairInZone {
-        /// Driver angle, rad.
-        theta1_rad: f64,
-        /// Sense.
-        direction: Direction,
-    },
-    /// A load that is no load.
-    #[error(
-        "load {load_nm} N.m on the driven shaft is outside 0 to {limit_nm:e} N.m: the sense is the direction's, the load is positive"
-    )]
-    Load {
-        /// Load given, N·m.
-        load_nm: f64,
-        /// Largest load accepted, N·m.
-        limit_nm: f64,
-    },
-    /// The angle is not a finite number.
-    #[error("theta1 is {theta1_rad}: a finite angle in rad is needed")]
-    NotFinite {
-        /// The angle given.
-        theta1_rad: f64,
-    },
-}
 
 /// The contact that carries at one driver angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -278,7 +230,7 @@ impl ContactModel {
         if !self.teeth.has_shape(tooth, z1, direction) {
             return constant_mm;
         }
-        let pitch_mm = self.tips.pitch_mm();
+        let pitch_mm = self.tips.pitch_mm;
         let half = if direction == Direction::Ccw { 0.0 } else { 0.5 };
         let shift_mm = (tooth as f64 + half) * pitch_mm;
         let opening_mm = touch.opening_per_mm(shift_mm, self.pair.pressure_angle_rad().cos()) * pitch_mm * pitch_mm;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::ContactError;
+use super::error::ContactError;
 use crate::{Direction, Errors, GearPair, RollPoint};
 
 /// Displacements of the gears' bodies from their shafts' ideal axes.

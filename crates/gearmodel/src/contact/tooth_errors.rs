@@ -85,7 +85,7 @@ impl ToothErrors {
 
     /// Lead of a tooth pair that does not change along the flank, mm.
     pub(super) fn pitch_lead_mm(&self, tooth: i64, direction: Direction) -> f64 {
-        let side = side_index(direction);
+        let side = direction.index();
         let of = |table: &[f64]| match table.len() {
             0 => 0.0,
             teeth => table[tooth.rem_euclid(teeth as i64) as usize],
@@ -95,7 +95,7 @@ impl ToothErrors {
 
     /// Smallest and largest lead that any two teeth's pitch errors can make, mm.
     pub(super) fn pitch_lead_range_mm(&self, direction: Direction) -> (f64, f64) {
-        let side = side_index(direction);
+        let side = direction.index();
         let tables = [&self.driver_pitch_mm[side], &self.driven_pitch_mm[side]];
         tables.into_iter().filter(|table| !table.is_empty()).fold((0.0, 0.0), |(low, high), table| {
             let (least, most) = table
@@ -107,19 +107,19 @@ impl ToothErrors {
 
     /// Whether the lead of any tooth pair changes along the flank.
     pub(super) fn any_shape(&self, direction: Direction) -> bool {
-        self.profile[side_index(direction)] != Profile::default()
+        self.profile[direction.index()] != Profile::default()
             || self.damage.iter().any(|damage| damage.flank == direction)
     }
 
     /// Whether a tooth pair's lead changes along the flank.
     pub(super) fn has_shape(&self, tooth: i64, teeth: u32, direction: Direction) -> bool {
-        self.profile[side_index(direction)] != Profile::default()
+        self.profile[direction.index()] != Profile::default()
             || self.damage.iter().any(|damage| damage.hits(tooth, teeth, direction))
     }
 
     /// Lead of a tooth pair that changes along the flank, mm, at the phase u in pitches from the pitch point.
     pub(super) fn shape_lead_mm(&self, tooth: i64, teeth: u32, phase: f64, direction: Direction) -> f64 {
-        let profile = &self.profile[side_index(direction)];
+        let profile = &self.profile[direction.index()];
         let lag_sign = -direction.sign();
         let mut lead = profile.slope_mm * phase + lag_sign * profile.crown_mm * 4.0 * phase * phase;
         for (order, (amplitude, shift)) in (1_u32..).zip(&profile.waves) {
@@ -138,13 +138,5 @@ impl ToothErrors {
 impl ToothDamage {
     fn hits(&self, tooth: i64, teeth: u32, direction: Direction) -> bool {
         self.flank == direction && tooth.rem_euclid(i64::from(teeth.max(1))) == i64::from(self.tooth)
-    }
-}
-
-/// 0 for the ccw flank, 1 for the cw flank: the order of all tables by flank.
-pub(super) fn side_index(direction: Direction) -> usize {
-    match direction {
-        Direction::Ccw => 0,
-        Direction::Cw => 1,
     }
 }

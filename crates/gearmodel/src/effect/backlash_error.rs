@@ -1,7 +1,7 @@
 //! Tooth thinning differs from the designed backlash by dj along the pitch curve:
 //! TE = −dir·(dj/2) cos α/A.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Tooth thinning differs from the designed backlash by dj along the pitch curve.
 pub(super) struct BacklashError;
@@ -13,6 +13,13 @@ impl Effect for BacklashError {
 
     fn component(&self) -> &'static str {
         "gear teeth"
+    }
+
+    fn words(&self) -> Words {
+        Words::new(
+            "backlash off its documented value",
+            "check tooth thickness with a feeler or over pins and correct backlash_mm in pair.toml",
+        )
     }
 
     fn signature(&self) -> Signature {

@@ -1,7 +1,7 @@
 //! Bearings with play: the load pushes the gear aside by c along the common normal, TE = −dir·c/A, whatever its size.
 //! The same trace as a backlash error of 2c/cos α.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Bearings with play.
 pub(super) struct BearingClearance;
@@ -13,6 +13,10 @@ impl Effect for BearingClearance {
 
     fn component(&self) -> &'static str {
         "bearings"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("clearance in the bearings", "preload or replace the bearings")
     }
 
     fn signature(&self) -> Signature {

@@ -1,7 +1,7 @@
 //! Bearings give way along the common normal, c mm a newton: with the tooth force F = 1000 T/A (T in N·m, A in mm),
 //! TE = −dir·1000 T c/A².
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Bearings give way along the common normal, c mm a newton.
 pub(super) struct BearingCompliance;
@@ -13,6 +13,10 @@ impl Effect for BearingCompliance {
 
     fn component(&self) -> &'static str {
         "bearings"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("compliance of the bearings", "preload or stiffen the bearings, or enter their compliance")
     }
 
     fn signature(&self) -> Signature {

@@ -3,7 +3,7 @@
 
 use super::{
     Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shaft, Shape, Signature,
-    StatedError,
+    StatedError, Words,
 };
 
 /// Torque ripple of the brake.
@@ -16,6 +16,10 @@ impl Effect for BrakeTorqueRipple {
 
     fn component(&self) -> &'static str {
         "brake"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("torque ripple of the brake", "record the torque beside the angle, or use a smoother brake")
     }
 
     fn signature(&self) -> Signature {

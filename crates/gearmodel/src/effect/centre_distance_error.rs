@@ -1,7 +1,7 @@
 //! Centre distance grown by Δa against the documented one: gear 1 moves by (−Δa, 0) against gear 2,
 //! TE = −dir·Δa tan(α ∓ μ)/r2.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Centre distance grown by Δa against the documented one.
 pub(super) struct CentreDistanceError;
@@ -13,6 +13,10 @@ impl Effect for CentreDistanceError {
 
     fn component(&self) -> &'static str {
         "housing"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("centre distance off its nominal value", "measure the centre distance and re-shim the housing")
     }
 
     fn signature(&self) -> Signature {

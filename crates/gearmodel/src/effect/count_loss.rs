@@ -1,5 +1,5 @@
 //! A counter loses (or wins) counts at the output: steps of n counts, always the same way, that stay. TE = Σ steps so far ·
-//! 2π n/(counts a revolution). The shape lists the times of the steps, s (`gap::events` finds them); the amplitude is one
+//! 2π n/(counts a revolution). The shape lists the times of the steps, s (the diagnosis finds them); the amplitude is one
 //! step, positive where the reading grows. The parameter `counts` is what is lost: positive where the reading falls.
 //!
 //! Steps too small to be seen one by one, or too many, look like a ramp over the way of the driver: the shape [−1] is that, and its
@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use super::{
     Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    Stated, StatedEffect, StatedError,
+    Stated, StatedEffect, StatedError, Words,
 };
 
 /// Stands for steps spread evenly over the way; times are not negative.
@@ -31,6 +31,13 @@ impl Effect for CountLoss {
 
     fn component(&self) -> &'static str {
         "acquisition"
+    }
+
+    fn words(&self) -> Words {
+        Words::new(
+            "lost counts at the output encoder",
+            "check cable, screen, supply and edge rate of the output encoder",
+        )
     }
 
     fn steps(&self) -> bool {
@@ -65,7 +72,7 @@ impl Effect for CountLoss {
             if let Some(counts_per_rev) = rig.output_counts_per_rev {
                 // Counts are lost at least one at a time.
                 let count_rad = TAU / counts_per_rev;
-                parameters.push(Parameter::grid("counts", -rate_rad.signum(), "counts"));
+                parameters.push(Parameter::derived("counts", -rate_rad.signum(), "counts"));
                 parameters.push(Parameter::number("per_rev", rate_rad.abs() / count_rad, std_rad / count_rad, "1/rev"));
             }
             parameters.push(Parameter::number("rate_rad_per_rev", rate_rad, std_rad, "rad/rev"));

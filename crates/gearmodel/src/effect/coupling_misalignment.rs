@@ -2,7 +2,9 @@
 //! In the output shaft the encoder reads θ2 + (β²/4) sin(2θ2 − φ); in the input shaft gear 1 stands at θ1 + (β²/4) sin(2θ1 − φ),
 //! seen as i times that.
 
-use super::{Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError};
+use super::{
+    Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Words,
+};
 
 /// Misalignment of the coupling in the input or output shaft.
 pub(super) struct CouplingMisalignment(pub(super) Shaft);
@@ -20,6 +22,14 @@ impl Effect for CouplingMisalignment {
             Shaft::Input => "input coupling",
             Shaft::Output => "output coupling",
         }
+    }
+
+    fn words(&self) -> Words {
+        let words = match self.0 {
+            Shaft::Input => Words::new("misalignment of the input coupling", "align the input shaft's coupling"),
+            Shaft::Output => Words::new("misalignment of the output coupling", "align the output shaft's coupling"),
+        };
+        words.of_family("coupling misalignment, input or output")
     }
 
     fn signature(&self) -> Signature {

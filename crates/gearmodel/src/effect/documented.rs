@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Effect, Given, LIBRARY, OperatingPoint, Rig, Shaft, Shape, StatedEffect, StatedError, by_name};
-use crate::{Errors, GearPair, GeometryError, NominalModel};
+use super::{Effect, Fold, Given, LIBRARY, OperatingPoint, Rig, Shaft, Shape, StatedEffect, StatedError, by_name};
+use crate::{Errors, GearPair, GeometryError};
 
 /// An effect with its shape and amplitudes.
 #[derive(Clone)]
@@ -101,17 +101,6 @@ impl Term {
     }
 }
 
-/// Documented error that an effect is a change of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fold {
-    /// e and φ of a gear.
-    Eccentricity(Shaft),
-    /// Compliance of a shaft.
-    ShaftCompliance(Shaft),
-    /// Compliance of the mesh.
-    MeshCompliance,
-}
-
 /// The effects of a nominal model beyond its [`Errors`]; empty for most.
 #[derive(Clone, Debug, Default)]
 pub struct Documented(Option<Arc<Inner>>);
@@ -142,7 +131,7 @@ impl Documented {
         if stated.is_empty() {
             return Ok(Self::default());
         }
-        let rig = |errors: Errors| Rig::new(NominalModel::bare(pair.clone(), errors), [None, None], None);
+        let rig = |errors: Errors| Rig::new(pair.clone(), errors, [None, None], None);
         let plain = rig(*errors);
         let mut terms = Vec::new();
         for (name, tables) in stated {

@@ -2,7 +2,9 @@
 //! θ + eps sin(nθ − φ) to first order. Seen in TE as −i eps sin(nθ1 − φ) for the input encoder, eps sin(nθ2 − φ) for the output
 //! encoder.
 
-use super::{Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError};
+use super::{
+    Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Words,
+};
 
 /// Order 1 or 2 of the input or output encoder's disc.
 pub(super) struct EncoderDisc {
@@ -31,6 +33,31 @@ impl Effect for EncoderDisc {
         match self.shaft {
             Shaft::Input => "input encoder",
             Shaft::Output => "output encoder",
+        }
+    }
+
+    fn words(&self) -> Words {
+        match (self.shaft, self.order) {
+            (Shaft::Input, Order::Eccentricity) => Words::new(
+                "eccentricity of the input encoder",
+                "re-centre the input encoder's disc, or read it with two heads",
+            )
+            .of_family("encoder eccentricity, input or output"),
+            (Shaft::Output, Order::Eccentricity) => Words::new(
+                "eccentricity of the output encoder",
+                "re-centre the output encoder's disc, or read it with two heads",
+            )
+            .of_family("encoder eccentricity, input or output"),
+            (Shaft::Input, Order::Ellipticity) => Words::new(
+                "ellipticity of the input encoder",
+                "loosen the input encoder's disc or hub: a clamped disc goes oval",
+            )
+            .of_family("encoder ellipticity, input or output"),
+            (Shaft::Output, Order::Ellipticity) => Words::new(
+                "ellipticity of the output encoder",
+                "loosen the output encoder's disc or hub: a clamped disc goes oval",
+            )
+            .of_family("encoder ellipticity, input or output"),
         }
     }
 

@@ -1,9 +1,10 @@
 //! Sub-divisional error: the signals within one line period are not true sine and cosine (offset: order 1 of the line,
 //! unequal amplitudes or quadrature: order 2), reading θ + a sin(h·L·θ − φ). Averaging over angle bins hides it; it is found
-//! on the samples (`gap::line_phase`). The shape is [order h, lines L].
+//! on the samples (by the diagnosis). The shape is [order h, lines L].
 
 use super::{
     Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError,
+    Words,
 };
 
 /// Names by encoder: these effects are found on the samples, not on the places.
@@ -22,6 +23,20 @@ impl Effect for EncoderInterpolation {
             Shaft::Input => "input encoder",
             Shaft::Output => "output encoder",
         }
+    }
+
+    fn words(&self) -> Words {
+        let words = match self.0 {
+            Shaft::Input => Words::new(
+                "interpolation error of the input encoder",
+                "adjust offset, gain and phase of the input encoder's sine signals",
+            ),
+            Shaft::Output => Words::new(
+                "interpolation error of the output encoder",
+                "adjust offset, gain and phase of the output encoder's sine signals",
+            ),
+        };
+        words.of_family("encoder interpolation, input or output")
     }
 
     fn signature(&self) -> Signature {

@@ -1,7 +1,7 @@
 //! Drag of seals and bearings winds the shafts up beside the load: TE = −dir·M·[C_out + C_in i² + C_mesh/A²] with the
 //! documented compliances, or at 1 rad/(N·m) where there are none.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Drag of seals and bearings winds the shafts up beside the load.
 pub(super) struct FrictionWindup;
@@ -13,6 +13,10 @@ impl Effect for FrictionWindup {
 
     fn component(&self) -> &'static str {
         "shafts and seals"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("wind-up by friction", "free seals and bearings that drag")
     }
 
     fn signature(&self) -> Signature {

@@ -3,7 +3,7 @@
 //! By the increment along the common normal, with a = dir·(α ∓ μ) (`increment::common_normal`):
 //! TE = [dx sin(θ1 + a) + dy cos(θ1 + a)]/A for gear 1, [dx sin(θ2 − a) + dy cos(θ2 − a)]/A for gear 2.
 
-use super::{Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature};
+use super::{Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, Words};
 
 /// Eccentricity of gear 1 (input) or gear 2 (output) against the documented one.
 pub(super) struct GearEccentricity(pub(super) Shaft);
@@ -21,6 +21,20 @@ impl Effect for GearEccentricity {
             Shaft::Input => "gear 1 on its shaft",
             Shaft::Output => "gear 2 on its shaft",
         }
+    }
+
+    fn words(&self) -> Words {
+        let words = match self.0 {
+            Shaft::Input => Words::new(
+                "eccentricity of gear 1",
+                "measure gear 1's run-out on its shaft and re-centre it, or enter the vector in pair.toml",
+            ),
+            Shaft::Output => Words::new(
+                "eccentricity of gear 2",
+                "measure gear 2's run-out on its shaft and re-centre it, or enter the vector in pair.toml",
+            ),
+        };
+        words.of_family("gear eccentricity, gear 1 or gear 2")
     }
 
     fn signature(&self) -> Signature {

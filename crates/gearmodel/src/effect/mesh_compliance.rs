@@ -1,6 +1,6 @@
 //! The teeth give way along the common normal: TE = −dir·T·C/A².
 
-use super::{Carrier, Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
+use super::{Carrier, Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// The teeth give way along the common normal.
 pub(super) struct MeshCompliance;
@@ -12,6 +12,10 @@ impl Effect for MeshCompliance {
 
     fn component(&self) -> &'static str {
         "gear teeth"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("compliance of the mesh", "enter the compliance in pair.toml: teeth do give way")
     }
 
     fn signature(&self) -> Signature {

@@ -4,7 +4,7 @@
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
-    StatedEffect, StatedError, stated,
+    StatedEffect, StatedError, Words,
 };
 
 /// Variation of the mesh compliance over the pitch.
@@ -19,6 +19,13 @@ impl Effect for MeshStiffnessVariation {
 
     fn component(&self) -> &'static str {
         "gear teeth"
+    }
+
+    fn words(&self) -> Words {
+        Words::new(
+            "stiffness varying with the tooth mesh",
+            "nothing is loose: enter it in the model, or raise the contact ratio",
+        )
     }
 
     fn signature(&self) -> Signature {
@@ -67,11 +74,11 @@ impl Effect for MeshStiffnessVariation {
     }
 
     fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
-        let duty = shape.first().copied().unwrap_or_else(|| rig.mean_single_pair_duty());
-        vec![
-            Parameter::number("c_mm2_rad_per_nm", found.beta[0], found.std(0), "mm2.rad/(N.m)"),
-            Parameter::grid("duty", duty, ""),
-        ]
+        let duty = match shape.first() {
+            Some(duty) => Parameter::grid("duty", *duty, ""),
+            None => Parameter::derived("duty", rig.mean_single_pair_duty(), ""),
+        };
+        vec![Parameter::number("c_mm2_rad_per_nm", found.beta[0], found.std(0), "mm2.rad/(N.m)"), duty]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {
@@ -90,7 +97,7 @@ impl Effect for MeshStiffnessVariation {
     }
 
     fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
-        let mut stated = stated::by_parameters(self, rig, shape, beta);
+        let mut stated = self.reported(rig, shape, beta);
         match shape[..] {
             [_, start] => stated.insert("start_pitches".to_owned(), Stated::Number(start)),
             // The tips of the teeth say where one pair carries.

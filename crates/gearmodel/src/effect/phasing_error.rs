@@ -1,6 +1,6 @@
 //! Gear 1 is clocked by δ against its encoder's index: it stands at θ1 + δ, TE = f(θ1 + δ) − f(θ1) = i δ.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Gear 1 is clocked by δ against its encoder's index.
 pub(super) struct PhasingError;
@@ -12,6 +12,13 @@ impl Effect for PhasingError {
 
     fn component(&self) -> &'static str {
         "gear 1 on its shaft, or the index"
+    }
+
+    fn words(&self) -> Words {
+        Words::new(
+            "clocking of gear 1 against the index",
+            "clock gear 1 to the encoder's index again, or enter the angle",
+        )
     }
 
     fn signature(&self) -> Signature {

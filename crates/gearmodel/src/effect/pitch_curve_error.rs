@@ -4,7 +4,7 @@
 
 use super::{
     Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    Stated, StatedEffect, StatedError, stated,
+    Stated, StatedEffect, StatedError, Words,
 };
 
 /// Error of the pitch curves' form or closure.
@@ -17,6 +17,10 @@ impl Effect for PitchCurveError {
 
     fn component(&self) -> &'static str {
         "gears"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("pitch curve off its nominal k", "check the gear's programme: k as cut against k in pair.toml")
     }
 
     fn signature(&self) -> Signature {
@@ -72,7 +76,7 @@ impl Effect for PitchCurveError {
     }
 
     fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
-        let mut stated = stated::by_parameters(self, rig, shape, beta);
+        let mut stated = self.reported(rig, shape, beta);
         let word = if shape[..] == [1.0] { "closure" } else { "form" };
         stated.insert("of".to_owned(), Stated::Text(word.to_owned()));
         stated

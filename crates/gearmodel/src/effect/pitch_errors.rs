@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, StatedError,
-    Value,
+    Words,
 };
 
 /// Pitch errors of the driver's teeth, flank by flank.
@@ -61,6 +61,13 @@ impl Effect for PitchErrors {
 
     fn component(&self) -> &'static str {
         "gear teeth"
+    }
+
+    fn words(&self) -> Words {
+        Words::new(
+            "pitch errors of the teeth",
+            "measure the pitch of the worst teeth named and regrind or replace the gear",
+        )
     }
 
     fn signature(&self) -> Signature {
@@ -135,13 +142,11 @@ impl Effect for PitchErrors {
         let teeth = teeth(rig);
         let mut ccw = table(&found.beta, teeth);
         let cw = ccw.split_off(teeth);
-        let tables = [("ccw_mm", ccw), ("cw_mm", cw)].map(|(name, values)| Parameter {
-            name,
-            value: Value::Table(values),
-            std: None,
-            unit: "mm",
-        });
-        tables.into_iter().chain([Parameter::grid("tip_reach", reach(shape, teeth), "")]).collect()
+        vec![
+            Parameter::table("ccw_mm", ccw, "mm"),
+            Parameter::table("cw_mm", cw, "mm"),
+            Parameter::grid("tip_reach", reach(shape, teeth), ""),
+        ]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
-    StatedEffect, StatedError,
+    StatedEffect, StatedError, Words,
 };
 
 /// Profile deviation by mesh orders.
@@ -45,6 +45,13 @@ impl Effect for ProfileError {
 
     fn component(&self) -> &'static str {
         "gear teeth"
+    }
+
+    fn words(&self) -> Words {
+        Words::new(
+            "profile error of the flanks",
+            "measure the flank profile; the same form at every tooth points to the tool",
+        )
     }
 
     fn signature(&self) -> Signature {

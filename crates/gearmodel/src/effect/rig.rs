@@ -6,7 +6,7 @@ use super::OperatingPoint;
 use crate::contact::ContactModel;
 use crate::increment::common_normal;
 use crate::pitch_curve::AnyCurve;
-use crate::{Direction, Errors, GearPair, NominalModel};
+use crate::{Direction, Errors, GearPair};
 
 /// Angles a turn at which the teeth in contact are looked up before their ends are refined.
 const ZONE_STEPS: usize = 720;
@@ -20,10 +20,11 @@ const LEAST_MESH_ORDER: f64 = 1e-4;
 /// Halvings of an angle step until the end of a contact is known, to 0.002°.
 const HALVINGS: usize = 8;
 
-/// A nominal model and what was noted about its encoders.
+/// A pair with its documented errors, and what was noted about the encoders.
 #[derive(Clone, Debug)]
 pub struct Rig {
-    model: NominalModel,
+    pair: GearPair,
+    errors: Errors,
     /// Lines of the input and of the output encoder, where known.
     pub lines: [Option<f64>; 2],
     /// Counts a revolution of the output encoder, where known or seen in the data.
@@ -47,26 +48,20 @@ pub struct MeshOrders {
 }
 
 impl Rig {
-    /// A rig of a nominal model.
+    /// A rig of a pair with its documented errors; `lines` are those of the input and of the output encoder.
     #[must_use]
-    pub fn new(model: NominalModel, lines: [Option<f64>; 2], output_counts_per_rev: Option<f64>) -> Self {
-        let spans = spans(&model.pair);
-        let pitch_mm = model.pair.pitch_mm().unwrap_or(f64::NAN);
-        let ratio_orders = ratio_orders(&model.pair);
-        let mesh_orders = mesh_orders(&model.pair, pitch_mm);
-        Self { model, lines, output_counts_per_rev, spans, pitch_mm, ratio_orders, mesh_orders }
+    pub fn new(pair: GearPair, errors: Errors, lines: [Option<f64>; 2], output_counts_per_rev: Option<f64>) -> Self {
+        let spans = spans(&pair);
+        let pitch_mm = pair.pitch_mm().unwrap_or(f64::NAN);
+        let ratio_orders = ratio_orders(&pair);
+        let mesh_orders = mesh_orders(&pair, pitch_mm);
+        Self { pair, errors, lines, output_counts_per_rev, spans, pitch_mm, ratio_orders, mesh_orders }
     }
 
     /// The pair.
     #[must_use]
     pub fn pair(&self) -> &GearPair {
-        &self.model.pair
-    }
-
-    /// The nominal model.
-    #[must_use]
-    pub fn model(&self) -> &NominalModel {
-        &self.model
+        &self.pair
     }
 
     /// Amplitudes of cos nθ1 and sin nθ1 in i21(θ1), n = 1, 2, …; empty where the ratio is constant.
@@ -171,7 +166,7 @@ impl Rig {
             shaft_compliance_input_rad_per_nm: input,
             mesh_compliance_mm2_rad_per_nm: mesh,
             ..
-        } = self.model.errors;
+        } = self.errors;
         if output == 0.0 && input == 0.0 && mesh == 0.0 {
             return 1.0;
         }

@@ -1,7 +1,7 @@
 //! A shaft is softer than documented: the load winds it up, TE = −dir·T·C for the output shaft, −dir·T·C i² for the input
 //! shaft, whose torque is T i and whose twist is seen through the ratio.
 
-use super::{Carrier, Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature};
+use super::{Carrier, Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, Words};
 
 /// Compliance of the input or output shaft beyond the documented one.
 pub(super) struct ShaftCompliance(pub(super) Shaft);
@@ -19,6 +19,19 @@ impl Effect for ShaftCompliance {
             Shaft::Input => "input shaft",
             Shaft::Output => "output shaft",
         }
+    }
+
+    fn words(&self) -> Words {
+        let words = match self.0 {
+            Shaft::Input => {
+                Words::new("wind-up of the input shaft", "stiffen the input side, or enter its compliance in pair.toml")
+            }
+            Shaft::Output => Words::new(
+                "wind-up of the output shaft",
+                "stiffen the output side, or enter its compliance in pair.toml",
+            ),
+        };
+        words.of_family("shaft wind-up, input or output")
     }
 
     fn signature(&self) -> Signature {

@@ -3,7 +3,7 @@
 
 use super::{
     Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    StatedError,
+    StatedError, Words,
 };
 
 /// Slip of a clamp or coupling.
@@ -16,6 +16,13 @@ impl Effect for Slip {
 
     fn component(&self) -> &'static str {
         "clamp or coupling"
+    }
+
+    fn words(&self) -> Words {
+        Words::new(
+            "slip under load",
+            "tighten the clamp or coupling that slips: mark both sides with a line and load it",
+        )
     }
 
     fn signature(&self) -> Signature {

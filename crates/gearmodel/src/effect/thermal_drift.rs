@@ -3,7 +3,7 @@
 
 use super::{
     Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    StatedError,
+    StatedError, Words,
 };
 
 /// Thermal growth of the centre distance.
@@ -16,6 +16,10 @@ impl Effect for ThermalDrift {
 
     fn component(&self) -> &'static str {
         "housing and gears"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("thermal drift of the centre distance", "warm up before measuring, or hold the temperature")
     }
 
     fn signature(&self) -> Signature {

@@ -1,6 +1,6 @@
 //! θ2 was read dt later than θ1, and by then has moved on: TE = dt·dθ2/dt = dt·i·dθ1/dt.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
+use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// θ2 was read dt later than θ1, and by then has moved on.
 pub(super) struct TimeSkew;
@@ -12,6 +12,10 @@ impl Effect for TimeSkew {
 
     fn component(&self) -> &'static str {
         "acquisition"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("time skew between the channels", "latch both encoders with one strobe, or correct the delay")
     }
 
     fn signature(&self) -> Signature {

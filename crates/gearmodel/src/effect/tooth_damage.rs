@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    StatedError, Value,
+    StatedError, Words,
 };
 
 /// One damaged tooth flank.
@@ -21,6 +21,10 @@ impl Effect for ToothDamage {
 
     fn component(&self) -> &'static str {
         "one tooth of gear 1, or its mate"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("damage to one tooth", "look at the tooth and flank named")
     }
 
     fn signature(&self) -> Signature {
@@ -79,12 +83,7 @@ impl Effect for ToothDamage {
             Parameter::grid("tooth", tooth, ""),
             Parameter::number("depth_mm", found.beta[0], found.std(0), "mm"),
             Parameter::grid("width", width, "pitches"),
-            Parameter {
-                name: "flank",
-                value: Value::Text(if flank > 0.0 { "ccw" } else { "cw" }),
-                std: None,
-                unit: "",
-            },
+            Parameter::word("flank", if flank > 0.0 { "ccw" } else { "cw" }),
         ]
     }
 

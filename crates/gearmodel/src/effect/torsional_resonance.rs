@@ -16,34 +16,113 @@ use std::f64::consts::TAU;
 
 use super::{
     Carrier, Effect, Estimate, Given, Grain, MeshOrders, OperatingPoint, Parameter, Parity, Plan, Rig, Rows, Shape,
-    Signature, Stated, StatedEffect, StatedError, stated,
+    Signature, Stated, StatedEffect, StatedError, Words,
 };
 
-/// What excites it, as a file states it, and the kind that it is.
-const EXCITED_BY: [&str; 3] = ["mesh", "turn", "encoder"];
-const KINDS: [f64; 3] = [MESH, TURN, ENCODER];
-/// Responses as a file states them, by number.
-const RESPONSES: [&str; 4] = ["whole", "whole less excitation", "carried", "carried less excitation"];
+/// What a shape says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Resonance {
+    excitation: Excitation,
+    f_hz: f64,
+    zeta: f64,
+}
 
-/// Response at x = ν/f of either sign, [re, im].
-fn response(number: f64, x: f64, zeta: f64) -> [f64; 2] {
-    let (re, im) = (1.0 - x * x, 2.0 * zeta * x);
-    let size = re * re + im * im;
-    let over = |a: f64, b: f64| [(a * re + b * im) / size, (b * re - a * im) / size];
-    match number as u8 {
-        0 => over(1.0, 0.0),
-        1 => over(x * x, -im),
-        2 => over(1.0, im),
-        _ => over(x * x, 0.0),
+/// What excites it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Excitation {
+    /// Something once a turn of the driver.
+    Turn(Response),
+    /// Something at the tooth mesh.
+    Mesh(Response),
+    /// The pair's own uneven motion, the output encoder on its coupling.
+    Encoder,
+}
+
+/// How an excitation comes through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Response {
+    /// 1/D.
+    Whole,
+    /// 1/D − 1.
+    WholeLessExcitation,
+    /// (1 + 2jζx)/D.
+    Carried,
+    /// x²/D.
+    CarriedLessExcitation,
+}
+
+/// Responses by their number in a shape.
+const RESPONSES: [Response; 4] =
+    [Response::Whole, Response::WholeLessExcitation, Response::Carried, Response::CarriedLessExcitation];
+/// Responses as a file states them, in the same order.
+const RESPONSE_WORDS: [&str; 4] = ["whole", "whole less excitation", "carried", "carried less excitation"];
+/// What excites it, as a file states it.
+const EXCITED_BY: [&str; 3] = ["mesh", "turn", "encoder"];
+
+impl Excitation {
+    /// How it comes through, where it comes from outside.
+    fn response(self) -> Option<Response> {
+        match self {
+            Self::Turn(response) | Self::Mesh(response) => Some(response),
+            Self::Encoder => None,
+        }
+    }
+
+    /// The same with another response; an encoder has none.
+    fn with(self, response: Response) -> Self {
+        match self {
+            Self::Turn(_) => Self::Turn(response),
+            Self::Mesh(_) => Self::Mesh(response),
+            Self::Encoder => Self::Encoder,
+        }
+    }
+}
+
+impl Resonance {
+    /// From the shape [kind, f, ζ, response], the last of kinds 0 and 1 alone.
+    fn of(shape: &Shape) -> Option<Self> {
+        let response = |number: f64| RESPONSES.get(number as usize).copied();
+        let (excitation, f_hz, zeta) = match shape[..] {
+            [0.0, f_hz, zeta, number] => (Excitation::Turn(response(number)?), f_hz, zeta),
+            [1.0, f_hz, zeta, number] => (Excitation::Mesh(response(number)?), f_hz, zeta),
+            [2.0, f_hz, zeta] => (Excitation::Encoder, f_hz, zeta),
+            _ => return None,
+        };
+        Some(Self { excitation, f_hz, zeta })
+    }
+
+    /// The way back.
+    fn shape(&self) -> Shape {
+        let Self { excitation, f_hz, zeta } = *self;
+        match excitation {
+            Excitation::Turn(response) => vec![0.0, f_hz, zeta, f64::from(response as u8)],
+            Excitation::Mesh(response) => vec![1.0, f_hz, zeta, f64::from(response as u8)],
+            Excitation::Encoder => vec![2.0, f_hz, zeta],
+        }
+    }
+}
+
+impl Response {
+    /// At x = ν/f of either sign, [re, im].
+    fn at(self, x: f64, zeta: f64) -> [f64; 2] {
+        let (re, im) = (1.0 - x * x, 2.0 * zeta * x);
+        let size = re * re + im * im;
+        let over = |a: f64, b: f64| [(a * re + b * im) / size, (b * re - a * im) / size];
+        match self {
+            Self::Whole => over(1.0, 0.0),
+            Self::WholeLessExcitation => over(x * x, -im),
+            Self::Carried => over(1.0, im),
+            Self::CarriedLessExcitation => over(x * x, 0.0),
+        }
     }
 }
 
 /// H(nω) E_n of the mesh's orders, `x` the turn's frequency over f.
-fn through(orders: &MeshOrders, number: f64, x: f64, zeta: f64) -> Vec<[f64; 2]> {
+fn through(orders: &MeshOrders, response: Response, x: f64, zeta: f64) -> Vec<[f64; 2]> {
     (orders.first..)
         .zip(&orders.amplitudes)
         .map(|(order, [a, b])| {
-            let [h, g] = response(number, f64::from(order) * x, zeta);
+            let [h, g] = response.at(f64::from(order) * x, zeta);
             [h * a - g * b, h * b + g * a]
         })
         .collect()
@@ -78,12 +157,6 @@ fn sum_of_orders(first: i32, amplitudes: &[[f64; 2]], theta_rad: f64) -> (f64, f
 
 /// Orders summed side by side, a power of 2.
 const LANES: usize = 8;
-/// Once a turn of the driver.
-const TURN: f64 = 0.0;
-/// At the tooth mesh.
-const MESH: f64 = 1.0;
-/// The output encoder on its coupling.
-const ENCODER: f64 = 2.0;
 /// First resonances of the encoder tried, in turns of the driver; the amplitude found moves them to where it is 1.
 const ENCODER_ORDERS: [f64; 3] = [6.0, 15.0, 100.0];
 /// Damping ratio of the encoder's coupling tried first: far below the resonance it does not show.
@@ -94,7 +167,7 @@ const TURN_RATIO: f64 = 1.35;
 const MESH_RATIO: f64 = 1.07;
 /// Damping ratio tried first where the mesh rings it.
 const MESH_ZETA: f64 = 0.05;
-/// How far the amplitude of kind 2 may be from 1, as a factor of f.
+/// How far the amplitude of an encoder may be from 1, as a factor of f.
 const CONSISTENT: f64 = 0.01;
 
 /// Torsional resonance of the drive train.
@@ -109,16 +182,22 @@ impl Effect for TorsionalResonance {
         "drive train"
     }
 
+    fn words(&self) -> Words {
+        Words::new("torsional resonance", "keep away from the speed that excites it, or stiffen the train")
+    }
+
     fn signature(&self) -> Signature {
         Signature::steady(Carrier::Input, Parity::Even).with_speed(Some(2.0))
     }
 
     fn signature_of(&self, _rig: &Rig, shape: &Shape) -> Signature {
-        match shape.first() {
+        match Resonance::of(shape).map(|resonance| resonance.excitation) {
             // Phase and gain of what is excited from outside turn with the sense.
-            Some(&TURN) => Signature { parity: Parity::Mixed, ..self.signature() },
-            Some(&MESH) => Signature { carrier: Carrier::Mesh, parity: Parity::Mixed, ..self.signature() },
-            _ => self.signature(),
+            Some(Excitation::Turn(_)) => Signature { parity: Parity::Mixed, ..self.signature() },
+            Some(Excitation::Mesh(_)) => {
+                Signature { carrier: Carrier::Mesh, parity: Parity::Mixed, ..self.signature() }
+            }
+            Some(Excitation::Encoder) | None => self.signature(),
         }
     }
 
@@ -134,73 +213,81 @@ impl Effect for TorsionalResonance {
         if *high < 1.2 * low {
             return Vec::new();
         }
-        let mut shapes: Vec<Shape> = Vec::new();
+        let mut tried: Vec<Resonance> = Vec::new();
         let turn_hz = high / TAU;
         for f_hz in frequencies(turn_hz, TURN_RATIO) {
-            shapes.extend([0.02, 0.1].map(|zeta| vec![TURN, f_hz, zeta, 0.0]));
+            let excitation = Excitation::Turn(Response::Whole);
+            tried.extend([0.02, 0.1].map(|zeta| Resonance { excitation, f_hz, zeta }));
         }
         // Where the mesh frequency sweeps over it, a resonance rings on in its own phase: the grid must be as fine as it is narrow.
         let teeth = f64::from(rig.pair().teeth().0);
         if teeth > 0.0 {
-            shapes.extend(frequencies(teeth * turn_hz, MESH_RATIO).map(|f_hz| vec![MESH, f_hz, MESH_ZETA, 0.0]));
+            let excitation = Excitation::Mesh(Response::Whole);
+            let of = |f_hz| Resonance { excitation, f_hz, zeta: MESH_ZETA };
+            tried.extend(frequencies(teeth * turn_hz, MESH_RATIO).map(of));
         }
         if !rig.ratio_orders().is_empty() {
-            shapes.extend(ENCODER_ORDERS.map(|order| vec![ENCODER, order * high / TAU, ENCODER_ZETA]));
+            let of = |f_hz| Resonance { excitation: Excitation::Encoder, f_hz, zeta: ENCODER_ZETA };
+            tried.extend(ENCODER_ORDERS.map(|order| of(order * high / TAU)));
         }
-        shapes
+        tried.iter().map(Resonance::shape).collect()
     }
 
     fn neighbours(&self, shape: &Shape, step: f64) -> Vec<Shape> {
-        let [kind, f_hz, zeta, ..] = shape[..] else { return Vec::new() };
-        let with = |f_hz: f64, zeta: f64| {
-            let mut near = shape.clone();
-            (near[1], near[2]) = (f_hz, zeta);
-            near
-        };
-        let mut shapes = Vec::new();
+        let Some(own) = Resonance::of(shape) else { return Vec::new() };
+        let mut near: Vec<Resonance> = Vec::new();
         for higher in [-0.16, -0.08, 0.0, 0.08, 0.16] {
             for softer in [-0.8, 0.0, 0.8] {
                 if higher != 0.0 || softer != 0.0 {
-                    let damping = (zeta * f64::exp(softer * step.sqrt())).clamp(0.005, 0.5);
-                    shapes.push(with(f_hz * f64::exp(higher * step), damping));
+                    let zeta = (own.zeta * f64::exp(softer * step.sqrt())).clamp(0.005, 0.5);
+                    near.push(Resonance { f_hz: own.f_hz * f64::exp(higher * step), zeta, ..own });
                 }
             }
         }
-        if let Some(own) = shape.get(3) {
-            let others = (0..RESPONSES.len()).map(|number| number as f64).filter(|number| number != own);
-            shapes.extend(others.map(|number| vec![kind, f_hz, zeta, number]));
+        if let Some(known) = own.excitation.response() {
+            let others = RESPONSES.into_iter().filter(|response| *response != known);
+            near.extend(others.map(|response| Resonance { excitation: own.excitation.with(response), ..own }));
         }
-        shapes
+        near.iter().map(Resonance::shape).collect()
     }
 
-    /// Kind 2 at the f whose amplitude is 1.
+    /// An encoder at the f whose amplitude is 1.
     fn refine(&self, _rig: &Rig, shape: &Shape, beta: &[f64]) -> Option<Shape> {
-        let ([ENCODER, f_hz, zeta], [amplitude]) = (&shape[..], beta) else { return None };
+        let own = Resonance::of(shape).filter(|own| own.excitation == Excitation::Encoder)?;
+        let [amplitude] = beta else { return None };
         let factor = 1.0 / amplitude.sqrt();
         // A negative amplitude has no f, an immense one means that there is nothing.
-        (factor.is_finite() && (factor - 1.0).abs() > CONSISTENT).then(|| vec![ENCODER, f_hz * factor, *zeta])
+        (factor.is_finite() && (factor - 1.0).abs() > CONSISTENT)
+            .then(|| Resonance { f_hz: own.f_hz * factor, ..own }.shape())
     }
 
     fn width(&self, _rig: &Rig, shape: &Shape) -> usize {
-        if shape.first() == Some(&ENCODER) { 1 } else { 2 }
+        match Resonance::of(shape).map(|resonance| resonance.excitation) {
+            Some(Excitation::Encoder) => 1,
+            _ => 2,
+        }
     }
 
-    /// Of kind 2, whose amplitude is (f/f_true)²; the others have two amplitudes, of either sign.
+    /// Of an encoder, whose amplitude is (f/f_true)²; the others have two amplitudes, of either sign.
     fn one_sided(&self) -> bool {
         true
     }
 
     fn rings_hz(&self, shape: &Shape, found: &Estimate) -> Option<f64> {
-        match shape[..] {
+        let Resonance { excitation, f_hz, .. } = Resonance::of(shape)?;
+        Some(match excitation {
             // β = (f_shape/f)².
-            [ENCODER, f_hz, _] => Some(f_hz / found.beta[0].max(f64::MIN_POSITIVE).sqrt()),
-            _ => shape.get(1).copied(),
-        }
+            Excitation::Encoder => f_hz / found.beta[0].max(f64::MIN_POSITIVE).sqrt(),
+            Excitation::Turn(_) | Excitation::Mesh(_) => f_hz,
+        })
     }
 
     fn grain(&self, shape: &Shape) -> Grain {
         // Orders of the turn are smooth, those of the mesh are not.
-        if shape.first() == Some(&MESH) { Grain::Fine } else { Grain::Smooth }
+        match Resonance::of(shape).map(|resonance| resonance.excitation) {
+            Some(Excitation::Mesh(_)) => Grain::Fine,
+            _ => Grain::Smooth,
+        }
     }
 
     fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
@@ -208,8 +295,7 @@ impl Effect for TorsionalResonance {
     }
 
     fn rows<'a>(&'a self, rig: &'a Rig, shape: &'a Shape) -> Rows<'a> {
-        let [kind, f_hz, zeta, ref rest @ ..] = shape[..] else { return Box::new(|_, _| ()) };
-        let number = rest.first().copied().unwrap_or(0.0);
+        let Some(Resonance { excitation, f_hz, zeta }) = Resonance::of(shape) else { return Box::new(|_, _| ()) };
         let orders = rig.mesh_orders();
         // Amplitudes of the orders change with the speed only, which a run keeps.
         let mut last: Option<(f64, Vec<[f64; 2]>)> = None;
@@ -221,23 +307,25 @@ impl Effect for TorsionalResonance {
             let (_, known) = last.get_or_insert_with(|| (hz, amplitudes(hz)));
             sum_of_orders(first, known, at.theta1_rad)
         };
-        match kind {
-            ENCODER => Box::new(move |at, row| row[0] = sum(1, at, &|hz| encoder_lead(rig, f_hz, zeta, hz)).0),
-            MESH => Box::new(move |at, row| {
-                let (re, im) = sum(orders.first, at, &|hz| through(orders, number, hz / f_hz, zeta));
+        match excitation {
+            Excitation::Encoder => {
+                Box::new(move |at, row| row[0] = sum(1, at, &|hz| encoder_lead(rig, f_hz, zeta, hz)).0)
+            }
+            Excitation::Mesh(response) => Box::new(move |at, row| {
+                let (re, im) = sum(orders.first, at, &|hz| through(orders, response, hz / f_hz, zeta));
                 // The cw flank stands half a pitch on.
                 (row[0], row[1]) = (at.sense * im, at.sense * re);
             }),
-            _ => Box::new(move |at, row| {
-                let (re, im) = sum(1, at, &|hz| vec![response(number, hz / f_hz, zeta)]);
+            Excitation::Turn(response) => Box::new(move |at, row| {
+                let (re, im) = sum(1, at, &|hz| vec![response.at(hz / f_hz, zeta)]);
                 (row[0], row[1]) = (im, re);
             }),
         }
     }
 
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
-        let [kind, f_hz, zeta, ..] = shape[..] else { return Vec::new() };
-        if kind == ENCODER {
+        let Some(Resonance { excitation, f_hz, zeta }) = Resonance::of(shape) else { return Vec::new() };
+        if excitation == Excitation::Encoder {
             // β = (f_shape/f)², so f = f_shape/√β and df = f dβ/(2β).
             let amplitude = found.beta[0].max(f64::MIN_POSITIVE);
             let f_hz = f_hz / amplitude.sqrt();
@@ -254,23 +342,29 @@ impl Effect for TorsionalResonance {
     }
 
     fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
-        let kind = KINDS[given.word("excited_by", &EXCITED_BY, true)?];
-        let mut shape = vec![kind, given.number_in("f_hz", 1e-6, 1e9)?, given.number_in("zeta", 1e-6, 10.0)?];
-        if kind == ENCODER {
+        let excited_by = EXCITED_BY[given.word("excited_by", &EXCITED_BY, true)?];
+        let (f_hz, zeta) = (given.number_in("f_hz", 1e-6, 1e9)?, given.number_in("zeta", 1e-6, 10.0)?);
+        let of = |excitation| Resonance { excitation, f_hz, zeta }.shape();
+        if excited_by == "encoder" {
             // Its own swing has no amplitude but what the ratio gives it.
-            return Ok((shape, vec![1.0]));
+            return Ok((of(Excitation::Encoder), vec![1.0]));
         }
-        shape.push(given.word("response", &RESPONSES, true)? as f64);
-        Ok((shape, given.polar("excitation_rad")?))
+        let response = RESPONSES[given.word("response", &RESPONSE_WORDS, true)?];
+        let excitation = if excited_by == "turn" { Excitation::Turn(response) } else { Excitation::Mesh(response) };
+        Ok((of(excitation), given.polar("excitation_rad")?))
     }
 
     fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
-        let mut stated = stated::by_parameters(self, rig, shape, beta);
-        let kind = KINDS.iter().position(|kind| shape.first() == Some(kind)).unwrap_or(0);
-        let word = EXCITED_BY[kind];
-        stated.insert("excited_by".to_owned(), Stated::Text(word.to_owned()));
-        if let Some(number) = shape.get(3) {
-            stated.insert("response".to_owned(), Stated::Text(RESPONSES[*number as usize].to_owned()));
+        let mut stated = self.reported(rig, shape, beta);
+        let Some(Resonance { excitation, .. }) = Resonance::of(shape) else { return stated };
+        let by = match excitation {
+            Excitation::Turn(_) => "turn",
+            Excitation::Mesh(_) => "mesh",
+            Excitation::Encoder => "encoder",
+        };
+        stated.insert("excited_by".to_owned(), Stated::Text(by.to_owned()));
+        if let Some(response) = excitation.response() {
+            stated.insert("response".to_owned(), Stated::Text(RESPONSE_WORDS[response as usize].to_owned()));
         }
         stated
     }

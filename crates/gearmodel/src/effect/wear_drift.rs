@@ -1,6 +1,6 @@
 //! Teeth wear, so that backlash grows with revolutions × load: dj = w Σ T·revolutions, TE = −dir·(dj/2) cos α/A.
 
-use super::{Accumulates, Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature};
+use super::{Accumulates, Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Teeth wear, so that backlash grows with revolutions × load.
 pub(super) struct WearDrift;
@@ -12,6 +12,10 @@ impl Effect for WearDrift {
 
     fn component(&self) -> &'static str {
         "gear teeth"
+    }
+
+    fn words(&self) -> Words {
+        Words::new("wear growing with revolutions", "check lubrication and the flanks; repeat an early run to see it")
     }
 
     fn signature(&self) -> Signature {

@@ -16,7 +16,7 @@ pub use tooth_stiffness::Material;
 use tooth_stiffness::ToothStiffness;
 
 use crate::contact::{ContactError, ContactModel, PairTouch};
-use crate::flank::Gear;
+use crate::gear::Gear;
 use crate::geometry_error::check_range;
 use crate::increment::common_normal;
 use crate::{Direction, GearPair, GeometryError, MeshPoint};

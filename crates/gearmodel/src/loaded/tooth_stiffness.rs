@@ -17,7 +17,7 @@
 //!
 //! Sources: ISO 6336-1 (C_M, c', c_γ); C. Weber, K. Banaschek, Formänderung und Profilrücknahme bei gerad- und schrägverzahnten Rädern (1953).
 
-use crate::flank::Gear;
+use crate::gear::Gear;
 use crate::tip::rising;
 use crate::{Direction, GearPair};
 

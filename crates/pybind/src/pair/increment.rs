@@ -291,10 +291,7 @@ impl GearPair {
     ) -> Result<Bound<'py, PyAny>> {
         let theta1 = Numbers::take("theta1", theta1)?;
         let direction = direction.parse::<Direction>()?;
-        let known = Parameter::from_name(parameter).ok_or_else(|| InputError::Parameter {
-            given: parameter.to_owned(),
-            known: Parameter::ALL.map(Parameter::name).join(", "),
-        })?;
+        let known = Parameter::from_name(parameter).ok_or_else(|| InputError::unknown_parameter(parameter))?;
         if !load_nm.is_finite() {
             return Err(InputError::Load { load_nm }.into());
         }

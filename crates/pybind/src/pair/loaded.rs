@@ -68,6 +68,16 @@ impl GearPair {
     }
 }
 
+/// A quantity of a loaded pair over angles; an angle that is not known has none.
+fn over<'py>(
+    py: Python<'py>,
+    theta1: &Bound<'py, PyAny>,
+    quantity: impl Fn(f64) -> std::result::Result<f64, ContactError> + Sync,
+) -> Result<Bound<'py, PyAny>> {
+    Numbers::take("theta1", theta1)?
+        .try_map(py, |theta1_rad| if theta1_rad.is_nan() { Ok(f64::NAN) } else { quantity(theta1_rad) })
+}
+
 #[pymethods]
 impl LoadedPair {
     /// TE under a torque on the driven shaft, rad: a float, or an array in the shape of theta1.
@@ -84,16 +94,12 @@ impl LoadedPair {
         direction: &str,
     ) -> Result<Bound<'py, PyAny>> {
         let direction = direction.parse::<Direction>()?;
-        Numbers::take("theta1", theta1)?.try_map(py, |theta1_rad| {
-            if theta1_rad.is_nan() { Ok(f64::NAN) } else { self.model.te_rad(theta1_rad, direction, load_nm) }
-        })
+        over(py, theta1, |theta1_rad| self.model.te_rad(theta1_rad, direction, load_nm))
     }
 
     /// Backlash TE_cw - TE_ccw under a torque on the driven shaft, rad: a float, or an array in the shape of theta1.
     fn backlash<'py>(&self, py: Python<'py>, theta1: &Bound<'py, PyAny>, load_nm: f64) -> Result<Bound<'py, PyAny>> {
-        Numbers::take("theta1", theta1)?.try_map(py, |theta1_rad| {
-            if theta1_rad.is_nan() { Ok(f64::NAN) } else { self.model.backlash_rad(theta1_rad, load_nm) }
-        })
+        over(py, theta1, |theta1_rad| self.model.backlash_rad(theta1_rad, load_nm))
     }
 
     /// State of the mesh over theta1 under a torque: record array with the fields theta1_rad, te_rad, force_n (along the common
@@ -154,12 +160,7 @@ impl LoadedPair {
         direction: &str,
     ) -> Result<Bound<'py, PyAny>> {
         let direction = direction.parse::<Direction>()?;
-        Numbers::take("theta1", theta1)?.try_map(py, |theta1_rad| {
-            if theta1_rad.is_nan() {
-                return Ok(f64::NAN);
-            }
-            self.model.mesh_stiffness_n_per_mm_um(theta1_rad, direction, load_nm)
-        })
+        over(py, theta1, |theta1_rad| self.model.mesh_stiffness_n_per_mm_um(theta1_rad, direction, load_nm))
     }
 
     /// The pair under it.

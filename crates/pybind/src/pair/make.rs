@@ -1,6 +1,6 @@
 //! The kinds of pairs, from what a drawing says.
 
-use gearmodel::{CurveSpec, PairSpec, ToothSpec};
+use gearmodel::{CurveSpec, EllipticalSpec, PairSpec, ToothSpec};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
@@ -119,7 +119,7 @@ impl GearPair {
         let teeth = tooth_spec(
             module_mm, teeth, pressure_angle_deg, centre_distance_mm, backlash_mm, face_width_mm, addendum, dedendum_clearance,
         )?;
-        Self::from_spec(PairSpec::Elliptical(teeth.with_eccentricity(eccentricity)))
+        Self::from_spec(PairSpec::Elliptical(EllipticalSpec { teeth, eccentricity }))
     }
 
     /// Circular gears, of equal or different tooth numbers.

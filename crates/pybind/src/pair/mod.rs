@@ -230,7 +230,7 @@ impl GearPair {
         }
         let pair = match &self.file.gears {
             PairSpec::Elliptical(spec) => {
-                tooth_call("elliptical", &spec.teeth_and_sizes(), &format!("eccentricity={:?}", spec.eccentricity))
+                tooth_call("elliptical", &spec.teeth, &format!("eccentricity={:?}", spec.eccentricity))
             }
             PairSpec::Circular(teeth) => tooth_call("circular", teeth, ""),
             PairSpec::Free { teeth, curve } => {

@@ -1,7 +1,7 @@
 //! `pair.toml`: a pair and its documented errors as a file.
 
-#[path = "pair_file_documented.rs"]
 mod documented;
+mod found;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -38,7 +38,7 @@ impl PairSpec {
     /// Kind as in the file, and the teeth where the kind has them.
     fn teeth(&self) -> (&'static str, Option<ToothSpec>) {
         match self {
-            Self::Elliptical(spec) => ("elliptical", Some(spec.teeth_and_sizes())),
+            Self::Elliptical(spec) => ("elliptical", Some(spec.teeth.clone())),
             Self::Circular(teeth) => ("circular", Some(teeth.clone())),
             Self::Free { teeth, curve } => (curve.kind(), Some(teeth.clone())),
             Self::Constant { .. } => ("constant", None),
@@ -246,15 +246,7 @@ impl PairFile {
                 line("centre_distance_mm", &centre_distance_mm);
             }
         }
-        let errors = &self.documented;
-        line("\n[documented]\ne1_mm", &errors.e1_mm);
-        line("phi1_rad", &errors.phi1_rad);
-        line("e2_mm", &errors.e2_mm);
-        line("phi2_rad", &errors.phi2_rad);
-        line("shaft_compliance_output_rad_per_nm", &errors.shaft_compliance_output_rad_per_nm);
-        line("shaft_compliance_input_rad_per_nm", &errors.shaft_compliance_input_rad_per_nm);
-        line("mesh_compliance_mm2_rad_per_nm", &errors.mesh_compliance_mm2_rad_per_nm);
-        documented::write(&mut text, &self.effects);
+        documented::write(&mut text, self.documented, &self.effects);
         text
     }
 }
@@ -306,7 +298,7 @@ impl RawFile {
             },
             _ => {
                 let eccentricity = need(kind, "eccentricity", self.eccentricity)?;
-                return Ok(PairSpec::Elliptical(teeth.with_eccentricity(eccentricity)));
+                return Ok(PairSpec::Elliptical(EllipticalSpec { teeth, eccentricity }));
             }
         };
         Ok(PairSpec::Free { teeth, curve })

@@ -6,10 +6,8 @@ use std::fmt::{self, Write as _};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 
-use super::PairFile;
-use crate::effect::predict::Found;
-use crate::effect::{LIBRARY, Stated, StatedEffect, Term, by_name};
-use crate::{Errors, GeometryError};
+use crate::Errors;
+use crate::effect::{LIBRARY, Stated, StatedEffect, by_name};
 
 /// The table as it stands in the file.
 #[derive(Default)]
@@ -94,11 +92,15 @@ impl<'de> Deserialize<'de> for RawDocumented {
     }
 }
 
-/// Writes the effects' tables.
-pub(super) fn write(text: &mut String, effects: &BTreeMap<String, Vec<StatedEffect>>) {
+/// Writes the table, and those of the effects.
+pub(super) fn write(text: &mut String, mut errors: Errors, effects: &BTreeMap<String, Vec<StatedEffect>>) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "\n[documented]");
+    for (key, field) in KEYS {
+        let _ = writeln!(text, "{key} = {:?}", field(&mut errors));
+    }
     for (name, tables) in effects {
         for table in tables {
-            // Writing to a String cannot fail.
             let _ = match tables.len() {
                 1 => writeln!(text, "\n[documented.{name}]"),
                 _ => writeln!(text, "\n[[documented.{name}]]"),
@@ -114,64 +116,14 @@ pub(super) fn write(text: &mut String, effects: &BTreeMap<String, Vec<StatedEffe
     }
 }
 
-impl PairFile {
-    /// The same file with these errors in place of its own; effects that are changes of an error go with them, others stay.
-    #[must_use]
-    pub fn with_errors(&self, errors: Errors) -> Self {
-        let mut effects = self.effects.clone();
-        effects.retain(|name, _| by_name(name).is_none_or(|effect| effect.folds_into().is_none()));
-        Self { gears: self.gears.clone(), documented: errors, effects }
-    }
-
-    /// The same file with the found effects under `[documented]`, and what could not be written down, a line each. What is a
-    /// change of a documented error is added to that; what adds to a documented effect, to its table.
-    ///
-    /// # Errors
-    /// [`GeometryError`] when the sum is no model: a compliance below zero, or a table that is there already makes no sense.
-    pub fn with_found(&self, found: &Found) -> Result<(Self, Vec<String>), GeometryError> {
-        let mut file = self.clone();
-        let mut left_out = Vec::new();
-        let Some(rig) = &found.rig else { return Ok((file, left_out)) };
-        for effect in &found.effects {
-            let name = effect.effect.name();
-            if name == "count_loss" {
-                left_out.push(format!(
-                    "{name}: counts were lost; when that happens again cannot be foreseen: see to the wiring"
-                ));
-                continue;
-            }
-            let term = Term { effect: effect.effect, shape: effect.shape.clone(), beta: effect.estimate.beta.clone() };
-            if term.fold_into(&mut file.documented) {
-                continue;
-            }
-            let tables = file.effects.entry(name.to_owned()).or_default();
-            let mut added = false;
-            for table in tables.iter_mut() {
-                let mut before = Term::from_stated(rig, name, table)?;
-                if before.add(rig, &term) {
-                    *table = before.stated(rig);
-                    added = true;
-                    break;
-                }
-            }
-            if !added {
-                tables.push(term.stated(rig));
-            }
-        }
-        // Compliances that a fit took a little too far the other way.
-        file.model()?;
-        Ok((file, left_out))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::effect::predict::{Condition, FoundEffect};
-    use crate::effect::{Estimate, Rig, Value};
-    use crate::{Direction, NominalModel};
+    use crate::effect::predict::Condition;
+    use crate::effect::{Estimate, Term, Value};
+    use crate::{Direction, NominalModel, PairFile};
 
     const PAIR: &str = "kind = \"elliptical\"\nmodule_mm = 3.0\nteeth = [47, 47]\neccentricity = 0.3287\n";
 
@@ -217,7 +169,7 @@ mod tests {
             let te = |model: &NominalModel, n: i32| model.te_under_rad(-0.0137 * f64::from(n), &under());
             assert!((0..500).any(|n| (te(&model, n) - te(&plain, n)).abs() > 1e-9), "{name} adds nothing");
             // Through amplitudes and back.
-            let rig = Rig::new(plain, [None, None], None);
+            let rig = plain.rig([None, None], None);
             let term = Term::from_stated(&rig, name, &file.effects[name][0]).unwrap();
             let again = Term::from_stated(&rig, name, &term.stated(&rig)).unwrap_or_else(|e| panic!("{name}: {e}"));
             assert_eq!((again.shape.len(), again.beta.len()), (term.shape.len(), term.beta.len()), "{name}");
@@ -229,7 +181,7 @@ mod tests {
 
     #[test]
     fn reported_parameters_that_may_be_stated_keep_their_names() {
-        let rig = Rig::new(PairFile::parse(PAIR).unwrap().model().unwrap(), [None, None], None);
+        let rig = PairFile::parse(PAIR).unwrap().model().unwrap().rig([None, None], None);
         for (name, table) in every_effect() {
             let file = PairFile::parse(&format!("{PAIR}{table}")).unwrap();
             let term = Term::from_stated(&rig, name, &file.effects[name][0]).unwrap();
@@ -280,28 +232,5 @@ mod tests {
         let constant =
             PairFile::parse("kind = \"constant\"\nratio = 3\n[documented.centre_distance_error]\nda_mm = 0.1\n");
         assert!(constant.unwrap().model().unwrap_err().to_string().contains("needs teeth"));
-    }
-
-    #[test]
-    fn found_effects_are_added_to_what_is_documented() {
-        let file = PairFile::parse(&format!("{PAIR}[documented.time_skew]\ndt_s = 1e-5\n")).unwrap();
-        let rig = Rig::new(file.model().unwrap(), [None, None], None);
-        let found = |name: &str, shape: Vec<f64>, beta: Vec<f64>| {
-            let covariance = DMatrix::zeros(beta.len(), beta.len());
-            FoundEffect { effect: by_name(name).unwrap(), shape, estimate: Estimate { beta, covariance } }
-        };
-        let effects = vec![
-            found("time_skew", vec![], vec![2e-5]),
-            found("gear2_eccentricity", vec![], vec![0.02, 0.0]),
-            found("tooth_damage", vec![5.0, 1.0, 0.5], vec![0.01]),
-            found("count_loss", vec![1.0, 2.0], vec![1e-6]),
-        ];
-        let (model, left_out) = file.with_found(&Found { rig: Some(rig), effects }).unwrap();
-        assert_eq!(model.documented.e2_mm, 0.02);
-        let Stated::Number(dt_s) = model.effects["time_skew"][0]["dt_s"] else { panic!("a number") };
-        assert!((dt_s - 3e-5).abs() < 1e-18 && model.effects["time_skew"].len() == 1);
-        assert_eq!(model.effects["tooth_damage"][0]["flank"], Stated::Text("ccw".to_owned()));
-        assert!(left_out.len() == 1 && left_out[0].contains("count_loss"));
-        assert_eq!(PairFile::parse(&model.to_toml()).unwrap(), model);
     }
 }

@@ -4,8 +4,6 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Effect, Estimate, Rig, Shape, Value};
-
 /// A parameter as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
@@ -16,16 +14,6 @@ pub enum Stated {
     Table(Vec<f64>),
     /// A word.
     Text(String),
-}
-
-impl From<Value> for Stated {
-    fn from(value: Value) -> Self {
-        match value {
-            Value::Number(number) => Self::Number(number),
-            Value::Table(table) => Self::Table(table),
-            Value::Text(text) => Self::Text(text.to_owned()),
-        }
-    }
 }
 
 /// Parameters of one effect by name.
@@ -221,24 +209,4 @@ impl<'a> Given<'a> {
         let (a, phase_rad) = (self.number(amplitude)?, self.number("phase_rad")?);
         Ok(vec![a * phase_rad.cos(), -a * phase_rad.sin()])
     }
-}
-
-/// Shape and amplitudes of an effect that is linear in its one parameter.
-///
-/// # Errors
-/// As for [`Given::number`].
-pub fn linear(given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
-    let beta = given.names.iter().map(|name| given.number(name)).collect::<Result<_, _>>()?;
-    Ok((Shape::new(), beta))
-}
-
-/// The parameters that an effect reports, as far as they may be stated.
-pub fn by_parameters(effect: &(impl Effect + ?Sized), rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
-    let known = Estimate { beta: beta.to_vec(), covariance: nalgebra::DMatrix::zeros(beta.len(), beta.len()) };
-    effect
-        .parameters(rig, shape, &known)
-        .into_iter()
-        .filter(|parameter| effect.parameter_names().contains(&parameter.name))
-        .map(|parameter| (parameter.name.to_owned(), parameter.value.into()))
-        .collect()
 }
