@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::family::Family;
 use super::generate::{Label, LabelledEffect};
 use super::signature;
-use rigsim::plant::undocumented::{self, find};
+use rigsim::plant::faults::{self, find};
 
 /// A group counts as an answer only where physics ties its members: under this angle, degrees.
 const TIED_UNDER_DEG: f64 = 2.0;
@@ -210,7 +210,7 @@ fn covered(effect: &LabelledEffect, parameters: &Value) -> Vec<(String, bool)> {
         .parameters
         .iter()
         .filter_map(|(name, value)| {
-            let undocumented::Value::Number(truth) = value else { return None };
+            let faults::Value::Number(truth) = value else { return None };
             let (value, std) = estimate(parameters, name)?;
             let mut miss = value - truth;
             if name == "phase_rad" || name.starts_with("ph") && name.ends_with("_rad") && name != "phasing_rad" {
@@ -233,7 +233,7 @@ fn shrink(label: &Label, gap: &Value) -> Option<f64> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use rigsim::plant::undocumented::Parameters;
+    use rigsim::plant::faults::Parameters;
     use serde_json::json;
 
     /// A label with these effects: name, outside, RMS in µrad.

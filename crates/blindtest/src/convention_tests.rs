@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use gearmodel::{Direction, NominalModel};
 
 use super::campaign::{self, Campaign, CampaignPlan, RunPlan};
-use rigsim::plant::undocumented::{FaultRng, Parameters, find};
+use rigsim::plant::faults::{FaultRng, Parameters, find};
 
 /// Where the formula is evaluated.
 struct At {
@@ -117,9 +117,9 @@ fn plan() -> CampaignPlan {
 /// RMS of what the effect adds, and of what its formula leaves of it, the zero of either removed.
 fn explained(name: &str, model: &NominalModel, sound: &Campaign) -> (f64, f64) {
     let mut spec = crate::plant_of_pair::plant_of_pair(model).unwrap().quiet();
-    let effect = find(name).unwrap();
-    let parameters = (effect.draw)(&spec, &mut FaultRng::new(77));
-    (effect.apply)(&mut spec, &parameters);
+    let fault = find(name).unwrap();
+    let parameters = fault.draw(&spec, &mut FaultRng::new(77));
+    (fault.apply)(&mut spec, &parameters);
     let changed = campaign::run(&spec, &plan(), 3).unwrap();
     let start = changed.runs[0].from;
     // Both rigs against the nominal model, so that they need not stand at the same angle.

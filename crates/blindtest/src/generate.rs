@@ -13,7 +13,7 @@ use super::size::Baseline;
 use crate::plant_of_pair::plant_of_pair;
 use riglog::pair;
 use rigsim::plant::PlantSpec;
-use rigsim::plant::undocumented::{FaultRng, OUTSIDE, Parameters, UNDOCUMENTED, Undocumented, Value, find};
+use rigsim::plant::faults::{FAULTS, Fault, FaultRng, Parameters, UNMODELLED_FAULTS, find};
 
 /// Effects that leave one and the same trace on the built-in pair; no case holds two of a row, for no analysis could tell them apart.
 const TIED: &[&[&str]] = &[
@@ -107,7 +107,7 @@ pub fn make(
     let mut rng = FaultRng::new(seed ^ (number as u64 + 1).wrapping_mul(0xD134_2543_DE82_EF95));
     let chosen = choose(&mut rng, family, before);
     let size_of = |suffix: &str| {
-        let sizes = chosen.iter().filter(|(effect, _)| effect.name.ends_with(suffix)).map(|(_, rms)| *rms);
+        let sizes = chosen.iter().filter(|(fault, _)| fault.name.ends_with(suffix)).map(|(_, rms)| *rms);
         sizes.reduce(f64::max)
     };
     let nominal = pair::parse(pair_toml, "pair.toml".as_ref())?;
@@ -127,20 +127,20 @@ pub fn make(
     if !chosen.is_empty() {
         let baseline = baseline_of(baselines, &sound, &plan)?;
         let sizing = Sizing { sound: &sound, baseline: &baseline, plan: &plan, seed: conditions.seed };
-        for (effect, wanted_rad) in &chosen {
-            let (parameters, size_rad) = fit(effect, *wanted_rad, &sizing, &mut rng)?;
-            (effect.apply)(&mut spec, &parameters);
-            let outside = OUTSIDE.iter().any(|other| other.name == effect.name);
-            effects.push(LabelledEffect { name: effect.name.into(), outside, parameters, rms_rad: size_rad });
+        for (fault, wanted_rad) in &chosen {
+            let (parameters, size_rad) = fit(fault, *wanted_rad, &sizing, &mut rng)?;
+            (fault.apply)(&mut spec, &parameters);
+            let outside = UNMODELLED_FAULTS.iter().any(|other| other.name == fault.name);
+            effects.push(LabelledEffect { name: fault.name.into(), outside, parameters, rms_rad: size_rad });
         }
         rms_rad = match effects.as_slice() {
             [only] => only.rms_rad,
-            _ => sizing.rms_rad(&spec, chosen.iter().any(|(effect, _)| effect.develops))?,
+            _ => sizing.rms_rad(&spec, chosen.iter().any(|(fault, _)| fault.develops))?,
         };
     }
     let campaign = campaign::run(&spec, &plan, conditions.seed)?;
     for effect in effects.iter_mut().filter(|effect| effect.name == "count_loss") {
-        effect.parameters = effect.parameters.clone().with("steps", Value::Number(campaign.count_losses as f64));
+        effect.parameters = effect.parameters.clone().with("steps", campaign.count_losses as f64);
     }
     let exclude = if family == Family::LeftOut {
         effects.iter().flat_map(|effect| tied_to(&effect.name)).map(str::to_owned).collect()
@@ -168,7 +168,7 @@ pub fn tied_to(name: &str) -> Vec<&str> {
 }
 
 /// Which effects, and their sizes.
-fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Undocumented, f64)> {
+fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Fault, f64)> {
     /// Effects whose trace nothing else in the library resembles.
     const ALONE: [&str; 12] = [
         "time_skew",
@@ -185,22 +185,24 @@ fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Un
         "profile_error",
     ];
     let several = |rng: &mut FaultRng, count: usize| {
-        let mut chosen: Vec<(&'static Undocumented, f64)> = Vec::new();
+        let mut chosen: Vec<(&'static Fault, f64)> = Vec::new();
         while chosen.len() < count {
-            let effect = &UNDOCUMENTED[rng.below(UNDOCUMENTED.len())];
-            let tied = tied_to(effect.name);
+            let fault = &FAULTS[rng.below(FAULTS.len())];
+            let tied = tied_to(fault.name);
             if chosen.iter().all(|(other, _)| !tied.contains(&other.name)) {
-                chosen.push((effect, rng.spread(TOGETHER_RAD.0, TOGETHER_RAD.1)));
+                chosen.push((fault, rng.spread(TOGETHER_RAD.0, TOGETHER_RAD.1)));
             }
         }
         chosen
     };
-    let unknown = |rng: &mut FaultRng| (&OUTSIDE[before % OUTSIDE.len()], rng.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1));
+    let unknown = |rng: &mut FaultRng| {
+        (&UNMODELLED_FAULTS[before % UNMODELLED_FAULTS.len()], rng.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1))
+    };
     match family {
         Family::Null => Vec::new(),
         Family::Single => {
-            let (effect, round) = (before % UNDOCUMENTED.len(), before / UNDOCUMENTED.len());
-            vec![(&UNDOCUMENTED[effect], SINGLE_SIZES_RAD[(effect + round) % SINGLE_SIZES_RAD.len()])]
+            let (fault, round) = (before % FAULTS.len(), before / FAULTS.len());
+            vec![(&FAULTS[fault], SINGLE_SIZES_RAD[(fault + round) % SINGLE_SIZES_RAD.len()])]
         }
         Family::Pair => several(rng, 2),
         Family::Triple => several(rng, 3),
@@ -211,7 +213,7 @@ fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Un
             chosen
         }
         Family::LeftOut => find(ALONE[before % ALONE.len()])
-            .map(|effect| (effect, rng.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1)))
+            .map(|fault| (fault, rng.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1)))
             .into_iter()
             .collect(),
     }
@@ -232,9 +234,9 @@ impl Sizing<'_> {
     }
 }
 
-/// Draws an effect and scales it to the size wanted; an effect that cannot be as large is as large as it can be.
+/// Draws a fault and scales it to the size wanted; a fault that cannot be as large is as large as it can be.
 fn fit(
-    effect: &Undocumented,
+    fault: &Fault,
     wanted_rad: f64,
     sizing: &Sizing<'_>,
     rng: &mut FaultRng,
@@ -246,23 +248,23 @@ fn fit(
     /// Steps back from what cannot be built.
     const STEPS_BACK: usize = 40;
     for _ in 0..DRAWS {
-        let mut parameters = (effect.draw)(sizing.sound, rng);
+        let mut parameters = fault.draw(sizing.sound, rng);
         let mut best = None;
         let mut limited = false;
         for _ in 0..CORRECTIONS {
             let mut measured = None;
             for _ in 0..STEPS_BACK {
-                parameters = settled(effect, parameters);
+                parameters = settled(fault, parameters);
                 let mut spec = sizing.sound.clone();
-                (effect.apply)(&mut spec, &parameters);
-                match sizing.rms_rad(&spec, effect.develops) {
+                (fault.apply)(&mut spec, &parameters);
+                match sizing.rms_rad(&spec, fault.develops) {
                     Ok(rms_rad) => {
                         measured = Some(rms_rad);
                         break;
                     }
                     Err(BlindError::Plant(_)) => {
                         limited = true;
-                        parameters = parameters.scaled(effect.amounts, 0.8);
+                        parameters = parameters.scaled(fault.amounts, 0.8);
                     }
                     Err(other) => return Err(other),
                 }
@@ -276,7 +278,7 @@ fn fit(
             if miss < TOLERANCE || (limited && rms_rad < wanted_rad) || rms_rad < 1e-7 {
                 break;
             }
-            parameters = parameters.scaled(effect.amounts, wanted_rad / rms_rad);
+            parameters = parameters.scaled(fault.amounts, wanted_rad / rms_rad);
         }
         if let Some((parameters, rms_rad, miss)) = best
             && (limited || miss < 0.5)
@@ -284,16 +286,16 @@ fn fit(
             return Ok((parameters, rms_rad));
         }
     }
-    Err(BlindError::Unfit { effect: effect.name, rms_rad: wanted_rad })
+    Err(BlindError::Unfit { effect: fault.name, rms_rad: wanted_rad })
 }
 
 /// Amounts that only come whole.
-fn settled(effect: &Undocumented, parameters: Parameters) -> Parameters {
-    if effect.name != "count_loss" {
+fn settled(fault: &Fault, parameters: Parameters) -> Parameters {
+    if fault.name != "count_loss" {
         return parameters;
     }
     let counts = parameters.number("counts");
-    parameters.with("counts", Value::Number(counts.abs().round().max(1.0).copysign(counts)))
+    parameters.with("counts", counts.abs().round().max(1.0).copysign(counts))
 }
 
 /// The pair's text with the compliance that its gears have.
@@ -313,7 +315,7 @@ mod tests {
     #[test]
     fn singles_go_through_every_effect_at_every_size() {
         let mut seen = std::collections::BTreeSet::new();
-        for n in 0..4 * UNDOCUMENTED.len() {
+        for n in 0..4 * FAULTS.len() {
             let chosen = choose(&mut FaultRng::new(1), Family::Single, n);
             assert!(seen.insert((chosen[0].0.name, (chosen[0].1 * 1e7) as u64)));
         }
@@ -323,8 +325,8 @@ mod tests {
     fn no_case_holds_what_nobody_can_tell_apart() {
         for n in 0..200 {
             let chosen = choose(&mut FaultRng::new(n), Family::Triple, 0);
-            for (k, (effect, _)) in chosen.iter().enumerate() {
-                let tied = tied_to(effect.name);
+            for (k, (fault, _)) in chosen.iter().enumerate() {
+                let tied = tied_to(fault.name);
                 assert!(chosen[..k].iter().all(|(other, _)| !tied.contains(&other.name)));
             }
         }

@@ -88,12 +88,12 @@ pub fn right(name: &str, signature: &Value) -> Option<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rigsim::plant::UNDOCUMENTED;
+    use rigsim::plant::FAULTS;
     use serde_json::json;
 
     #[test]
     fn every_row_is_an_effect_and_wrong_words_are_wrong() {
-        assert!(ROWS.iter().all(|row| UNDOCUMENTED.iter().any(|effect| effect.name == row.name)));
+        assert!(ROWS.iter().all(|row| FAULTS.iter().any(|effect| effect.name == row.name)));
         let said = json!({"carrier": "input", "parity": "odd", "load_exponent": 0.1, "speed_exponent": 0.9, "accumulates": "no"});
         assert_eq!(right("time_skew", &said), Some(true));
         assert_eq!(right("backlash_error", &said), Some(false));

@@ -85,7 +85,7 @@ fn at(curve: &[f64], theta1_rad: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rigsim::plant::undocumented::find;
+    use rigsim::plant::faults::find;
 
     #[test]
     fn sizes_are_those_of_the_formulas() {

@@ -12,7 +12,7 @@ use blindtest::plant_of_pair::{NoSimulatedGears, plant_of_pair};
 use gearmodel::NominalModel;
 use rigsim::emulator::QsbClock;
 pub use rigsim::plant::PlantSpec;
-use rigsim::plant::undocumented::{OUTSIDE, UNDOCUMENTED, find};
+use rigsim::plant::faults::{FAULTS, Fault, UNMODELLED_FAULTS, find};
 use rigsim::pty::Terminal;
 use rigsim::shaft_record::ShaftRecord;
 use rigsim::simulated_rig::{self, SimulatedRig};
@@ -57,37 +57,37 @@ pub enum SimError {
     },
 }
 
-/// Whether the plant has an effect of this name.
+/// Whether the plant has a fault of this name.
 #[must_use]
 pub fn is_undocumented(name: &str) -> bool {
     find(name).is_some()
 }
 
-/// Names of the plant's effects.
+/// Names of the plant's faults.
 #[must_use]
 pub fn undocumented_names() -> Vec<&'static str> {
-    UNDOCUMENTED.iter().chain(OUTSIDE).map(|effect| effect.name).collect()
+    FAULTS.iter().chain(UNMODELLED_FAULTS).map(|fault| fault.name).collect()
 }
 
-/// The plant's effects, a line each.
+/// The plant's faults, a line each.
 #[must_use]
 pub fn describe_undocumented() -> String {
-    let line = |effect: &rigsim::plant::undocumented::Undocumented| format!("{:<32} {}", effect.name, effect.summary);
-    let known = UNDOCUMENTED.iter().map(line);
-    let outside = OUTSIDE.iter().map(|effect| format!("{} (outside the library)", line(effect)));
+    let line = |fault: &Fault| format!("{:<32} {}", fault.name, fault.summary);
+    let known = FAULTS.iter().map(line);
+    let outside = UNMODELLED_FAULTS.iter().map(|fault| format!("{} (outside the library)", line(fault)));
     known.chain(outside).collect::<Vec<_>>().join("\n")
 }
 
 /// The plant for a nominal pair: its gears and documented errors, and what is left undocumented.
 ///
 /// # Errors
-/// [`SimError`] for a kind of pair or an effect that the plant has not.
+/// [`SimError`] for a kind of pair or a fault that the plant has not.
 pub fn spec(model: &NominalModel, undocumented: &[String]) -> Result<PlantSpec, SimError> {
     let mut spec = plant_of_pair(model)?;
     for name in undocumented {
-        let effect = find(name)
+        let fault = find(name)
             .ok_or_else(|| SimError::Effect { name: name.clone(), known: undocumented_names().join(", ") })?;
-        effect.apply_usual(&mut spec);
+        fault.apply_usual(&mut spec);
     }
     Ok(spec)
 }

@@ -14,7 +14,7 @@
 //! | encoders, counters, skew between them, a soft coupling | `encoder`, `skew`, `resonance` |
 //! | displacements of a reading that no known effect makes | `oddity` |
 //! | bearings' run-out, slipping clamp, lost counts | `run_out`, `slippage` |
-//! | effects that the nominal model does not know | [`undocumented`] |
+//! | faults that the nominal model does not know | [`faults`] |
 //!
 //! Same specification, seed and sequence of calls give the same samples, bit for bit.
 
@@ -22,6 +22,7 @@ mod brake;
 mod chain;
 mod encoder;
 mod error;
+pub mod faults;
 mod flank;
 mod geometry;
 mod hysteresis;
@@ -39,11 +40,11 @@ mod table;
 mod teeth;
 #[cfg(test)]
 mod tests;
-pub mod undocumented;
 
 pub use brake::{BrakeCurvePoint, BrakeSpec, STICK_SLIP_LIMIT_RPM};
 pub use encoder::{CountLossSpec, EncoderSpec, EncodersSpec};
 pub use error::PlantError;
+pub use faults::{FAULTS, UNMODELLED_FAULTS};
 pub use flank::Flank;
 pub use geometry::GearSpec;
 pub use mesh::{BearingSpec, DEFAULT_MESH_COMPLIANCE_MM2_RAD_PER_NM, HousingSpec, MeshSpec};
@@ -57,4 +58,3 @@ pub use spec::{
     DEFAULT_SHAFT_COMPLIANCE_INPUT_RAD_PER_NM, DEFAULT_SHAFT_COMPLIANCE_OUTPUT_RAD_PER_NM, PlantSpec, ShaftSpec,
 };
 pub use teeth::{DamageSpec, ProfileOrder, ToothSpec};
-pub use undocumented::{OUTSIDE, UNDOCUMENTED};

@@ -1,4 +1,4 @@
-//! Random choices for drawing effects.
+//! Random choices for drawing faults.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};

@@ -1,4 +1,4 @@
-//! Parameters of an effect, by the names under which the diagnosis reports them; units are in the names.
+//! Parameters of a fault, by the names under which the diagnosis reports them; units are in the names.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -15,7 +15,19 @@ pub enum Value {
     Word(String),
 }
 
-/// The parameters of one effect.
+impl From<f64> for Value {
+    fn from(number: f64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl From<&str> for Value {
+    fn from(word: &str) -> Self {
+        Self::Word(word.to_owned())
+    }
+}
+
+/// The parameters of one fault.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Parameters(BTreeMap<String, Value>);
@@ -27,14 +39,20 @@ impl Parameters {
         Self(numbers.iter().map(|&(name, value)| (name.to_owned(), Value::Number(value))).collect())
     }
 
-    /// The same with one more.
+    /// The same with this one, be it new or another value of one that is there.
     #[must_use]
-    pub fn with(mut self, name: &str, value: Value) -> Self {
-        self.0.insert(name.to_owned(), value);
+    pub fn with(mut self, name: &str, value: impl Into<Value>) -> Self {
+        self.0.insert(name.to_owned(), value.into());
         self
     }
 
-    /// A number; 0, which switches an effect off, where there is none.
+    /// The same with one number multiplied.
+    #[must_use]
+    pub fn times(self, name: &str, factor: f64) -> Self {
+        self.scaled(&[(name, 1.0)], factor)
+    }
+
+    /// A number; 0, which switches a fault off, where there is none.
     #[must_use]
     pub fn number(&self, name: &str) -> f64 {
         match self.0.get(name) {
@@ -89,7 +107,7 @@ mod tests {
     fn amounts_scale_and_the_rest_stays() {
         let parameters = Parameters::of(&[("eps", 2.0), ("f_hz", 8.0), ("phase_rad", 1.0)])
             .with("ccw_mm", Value::Numbers(vec![1.0, -2.0]))
-            .with("flank", Value::Word("ccw".into()));
+            .with("flank", "ccw");
         let scaled = parameters.scaled(&[("eps", 1.0), ("f_hz", -0.5), ("ccw_mm", 1.0)], 4.0);
         assert_eq!((scaled.number("eps"), scaled.number("f_hz"), scaled.number("phase_rad")), (8.0, 4.0, 1.0));
         assert_eq!(scaled.numbers("ccw_mm"), [4.0, -8.0]);
