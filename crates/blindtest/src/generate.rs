@@ -15,14 +15,6 @@ use riglog::pair;
 use rigsim::plant::PlantSpec;
 use rigsim::plant::faults::{FAULTS, Fault, FaultRng, Parameters, UNMODELLED_FAULTS, find};
 
-/// Effects that leave one and the same trace on the built-in pair; no case holds two of a row, for no analysis could tell them apart.
-const TIED: &[&[&str]] = &[
-    &["encoder1_eccentricity", "encoder2_eccentricity", "pitch_curve_error", "phasing_error"],
-    &["encoder1_ellipticity", "coupling_misalignment_input"],
-    &["encoder2_ellipticity", "coupling_misalignment_output"],
-    &["backlash_error", "bearing_clearance"],
-    &["mesh_compliance", "bearing_compliance"],
-];
 /// Sizes of effects that come together, rad RMS.
 const TOGETHER_RAD: (f64, f64) = (12e-6, 60e-6);
 /// Sizes of what is outside the library, rad RMS.
@@ -143,7 +135,8 @@ pub fn make(
         effect.parameters = effect.parameters.clone().with("steps", campaign.count_losses as f64);
     }
     let exclude = if family == Family::LeftOut {
-        effects.iter().flat_map(|effect| tied_to(&effect.name)).map(str::to_owned).collect()
+        let hidden = |fault: &Fault| chosen.iter().any(|(chosen, _)| chosen.is_confusable_with(fault));
+        FAULTS.iter().filter(|fault| hidden(fault)).map(|fault| fault.name.to_owned()).collect()
     } else {
         Vec::new()
     };
@@ -159,12 +152,6 @@ pub fn make(
         rate_hz: conditions.rate_hz,
     };
     Ok(Case { campaign, pair_toml: document(pair_toml, conditions.mesh_compliance_mm2_rad_per_nm), label })
-}
-
-/// Effects that cannot be told from `name`, itself among them.
-#[must_use]
-pub fn tied_to(name: &str) -> Vec<&str> {
-    TIED.iter().find(|row| row.contains(&name)).map_or_else(|| vec![name], |row| row.to_vec())
 }
 
 /// Which effects, and their sizes.
@@ -188,8 +175,8 @@ fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Fa
         let mut chosen: Vec<(&'static Fault, f64)> = Vec::new();
         while chosen.len() < count {
             let fault = &FAULTS[rng.below(FAULTS.len())];
-            let tied = tied_to(fault.name);
-            if chosen.iter().all(|(other, _)| !tied.contains(&other.name)) {
+            // No analysis could tell confusable faults of one case apart.
+            if chosen.iter().all(|(other, _)| !other.is_confusable_with(fault)) {
                 chosen.push((fault, rng.spread(TOGETHER_RAD.0, TOGETHER_RAD.1)));
             }
         }
@@ -326,8 +313,7 @@ mod tests {
         for n in 0..200 {
             let chosen = choose(&mut FaultRng::new(n), Family::Triple, 0);
             for (k, (fault, _)) in chosen.iter().enumerate() {
-                let tied = tied_to(fault.name);
-                assert!(chosen[..k].iter().all(|(other, _)| !tied.contains(&other.name)));
+                assert!(chosen[..k].iter().all(|(other, _)| !other.is_confusable_with(fault)));
             }
         }
     }

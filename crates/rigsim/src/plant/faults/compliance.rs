@@ -2,6 +2,7 @@
 
 use super::fault::Fault;
 use super::parameters::Parameters;
+use super::signature::{Carrier, Signature};
 
 /// The shaft between input encoder and gear 1 is softer than documented, by 4e-6 rad/(N·m): a key that gives, a longer shaft.
 pub const INPUT_SHAFT: Fault = Fault {
@@ -11,6 +12,8 @@ pub const INPUT_SHAFT: Fault = Fault {
     vary: |_, usual, _| usual,
     amounts: &[("c_rad_per_nm", 1.0)],
     develops: false,
+    signature: Some(Signature::WINDUP),
+    same_trace_as: None,
     apply: |spec, parameters| spec.shafts.compliance_input_rad_per_nm += parameters.number("c_rad_per_nm"),
 };
 
@@ -22,6 +25,8 @@ pub const OUTPUT_SHAFT: Fault = Fault {
     vary: |_, usual, _| usual,
     amounts: &[("c_rad_per_nm", 1.0)],
     develops: false,
+    signature: Some(Signature::WINDUP),
+    same_trace_as: None,
     apply: |spec, parameters| spec.shafts.compliance_output_rad_per_nm += parameters.number("c_rad_per_nm"),
 };
 
@@ -34,6 +39,8 @@ pub const MESH: Fault = Fault {
     vary: |_, usual, _| usual,
     amounts: &[("c_mm2_rad_per_nm", 1.0)],
     develops: false,
+    signature: Some(Signature::WINDUP),
+    same_trace_as: None,
     apply: |spec, parameters| spec.mesh.compliance_mm2_rad_per_nm += parameters.number("c_mm2_rad_per_nm"),
 };
 
@@ -45,6 +52,8 @@ pub const BEARING: Fault = Fault {
     vary: |_, usual, _| usual,
     amounts: &[("c_mm_per_n", 1.0)],
     develops: false,
+    signature: Some(Signature::WINDUP),
+    same_trace_as: Some("mesh_compliance"),
     apply: |spec, parameters| spec.bearings.compliance_mm_per_n += parameters.number("c_mm_per_n"),
 };
 
@@ -57,6 +66,8 @@ pub const MESH_STIFFNESS_VARIATION: Fault = Fault {
     vary: |_, usual, rng| usual.with("duty", rng.between(0.35, 0.8)),
     amounts: &[("c_mm2_rad_per_nm", 1.0)],
     develops: false,
+    signature: Some(Signature { load_exponent: Some(1.0), ..Signature::STEADY.over(Carrier::Mesh) }),
+    same_trace_as: None,
     apply: |spec, parameters| {
         spec.teeth.stiffness_variation_mm2_rad_per_nm = parameters.number("c_mm2_rad_per_nm");
         spec.teeth.double_contact_share = parameters.number("duty");

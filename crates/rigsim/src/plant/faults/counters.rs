@@ -2,6 +2,7 @@
 
 use super::fault::Fault;
 use super::parameters::Parameters;
+use super::signature::Signature;
 
 /// The output encoder is latched later than the input, by two readers with a clock each or by a filter in one of them: 60 µs,
 /// 31 µrad at 5 rpm and a ratio of 1.
@@ -12,6 +13,8 @@ pub const TIME_SKEW: Fault = Fault {
     vary: |_, usual, rng| usual.times("dt_s", rng.sign()),
     amounts: &[("dt_s", 1.0)],
     develops: false,
+    signature: Some(Signature { speed_exponent: Some(1.0), ..Signature::STEADY_ODD }),
+    same_trace_as: None,
     apply: |spec, parameters| spec.encoders.time_skew_s += parameters.number("dt_s"),
 };
 
@@ -24,6 +27,8 @@ pub const COUNT_LOSS: Fault = Fault {
     vary: |_, usual, rng| usual.times("counts", rng.sign()).with("per_rev", rng.spread(0.1, 1.0)),
     amounts: &[("counts", 1.0)],
     develops: true,
+    signature: None,
+    same_trace_as: None,
     apply: |spec, parameters| {
         let loss = &mut spec.encoders.output_count_loss;
         loss.losses_per_rev = parameters.number("per_rev");

@@ -2,6 +2,7 @@
 
 use super::fault::{Fault, any_phase};
 use super::parameters::Parameters;
+use super::signature::{Accumulation, Carrier, Signature};
 use crate::plant::resonance::SoftCouplingSpec;
 
 /// The coupling between the input encoder and gear 1 runs at an angle of 0.8° and turns unevenly, as Cardan's joint does,
@@ -14,6 +15,8 @@ pub const INPUT_MISALIGNMENT: Fault = Fault {
     // tan²(β/2) grows with the square of β.
     amounts: &[("beta_rad", 0.5)],
     develops: false,
+    signature: Some(Signature::STEADY_EVEN.over(Carrier::Input)),
+    same_trace_as: Some("encoder1_ellipticity"),
     apply: |spec, parameters| {
         spec.shafts.input_cardan_angle_rad = parameters.number("beta_rad");
         spec.shafts.input_cardan_phase_rad = parameters.number("phase_rad");
@@ -28,6 +31,8 @@ pub const OUTPUT_MISALIGNMENT: Fault = Fault {
     vary: any_phase,
     amounts: &[("beta_rad", 0.5)],
     develops: false,
+    signature: Some(Signature::STEADY_EVEN.over(Carrier::Output)),
+    same_trace_as: Some("encoder2_ellipticity"),
     apply: |spec, parameters| {
         spec.shafts.output_cardan_angle_rad = parameters.number("beta_rad");
         spec.shafts.output_cardan_phase_rad = parameters.number("phase_rad");
@@ -44,6 +49,8 @@ pub const TORSIONAL_RESONANCE: Fault = Fault {
     // Far below the resonance the twist grows with 1/f².
     amounts: &[("f_hz", -0.5)],
     develops: false,
+    signature: Some(Signature { speed_exponent: Some(2.0), ..Signature::STEADY_EVEN }),
+    same_trace_as: None,
     apply: |spec, parameters| {
         spec.encoders.output_coupling =
             Some(SoftCouplingSpec { f_hz: parameters.number("f_hz"), zeta: parameters.number("zeta") });
@@ -59,6 +66,8 @@ pub const SLIP: Fault = Fault {
     vary: |_, usual, rng| usual.with("t0_nm", rng.between(2.0, 8.0)),
     amounts: &[("k_rad_per_rev_nm", 1.0)],
     develops: true,
+    signature: Some(Signature { accumulation: Some(Accumulation::PerRevolution), ..Signature::OPEN }),
+    same_trace_as: None,
     apply: |spec, parameters| {
         let clamp = &mut spec.clamp;
         clamp.creep_rad_per_rev_nm = parameters.number("k_rad_per_rev_nm");

@@ -2,6 +2,7 @@
 
 use super::fault::{Fault, any_phase};
 use super::parameters::Parameters;
+use super::signature::{Carrier, Signature};
 use crate::plant::encoder::EncoderSpec;
 
 /// The input encoder's disc is off centre by 4e-5 of its track radius (1.6 µm at 40 mm).
@@ -12,6 +13,8 @@ pub const INPUT_ECCENTRICITY: Fault = Fault {
     vary: any_phase,
     amounts: &[("eps", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY_EVEN),
+    same_trace_as: None,
     apply: |spec, parameters| off_centre(&mut spec.encoders.input, parameters),
 };
 
@@ -23,6 +26,8 @@ pub const OUTPUT_ECCENTRICITY: Fault = Fault {
     vary: any_phase,
     amounts: &[("eps", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY_EVEN),
+    same_trace_as: Some("encoder1_eccentricity"),
     apply: |spec, parameters| off_centre(&mut spec.encoders.output, parameters),
 };
 
@@ -34,6 +39,8 @@ pub const INPUT_ELLIPTICITY: Fault = Fault {
     vary: any_phase,
     amounts: &[("eps", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY_EVEN.over(Carrier::Input)),
+    same_trace_as: None,
     apply: |spec, parameters| out_of_round(&mut spec.encoders.input, parameters),
 };
 
@@ -45,6 +52,8 @@ pub const OUTPUT_ELLIPTICITY: Fault = Fault {
     vary: any_phase,
     amounts: &[("eps", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY_EVEN.over(Carrier::Output)),
+    same_trace_as: None,
     apply: |spec, parameters| out_of_round(&mut spec.encoders.output, parameters),
 };
 

@@ -3,7 +3,12 @@
 
 use super::fault::{Fault, any_phase};
 use super::parameters::Parameters;
+use super::signature::{Accumulation, Carrier, Signature};
 use crate::plant::encoder::EncoderSpec;
+
+/// It repeats with the lines; the rest is open, for samples may be rarer than lines.
+const PER_LINE: Signature =
+    Signature { carrier: Some(Carrier::EncoderLine), accumulation: Some(Accumulation::None), ..Signature::OPEN };
 
 /// The input encoder's signals.
 pub const INPUT: Fault = Fault {
@@ -13,6 +18,8 @@ pub const INPUT: Fault = Fault {
     vary: any_phase,
     amounts: &[("a_rad", 1.0)],
     develops: false,
+    signature: Some(PER_LINE),
+    same_trace_as: None,
     apply: |spec, parameters| divide(&mut spec.encoders.input, parameters),
 };
 
@@ -24,6 +31,8 @@ pub const OUTPUT: Fault = Fault {
     vary: any_phase,
     amounts: &[("a_rad", 1.0)],
     develops: false,
+    signature: Some(PER_LINE),
+    same_trace_as: None,
     apply: |spec, parameters| divide(&mut spec.encoders.output, parameters),
 };
 

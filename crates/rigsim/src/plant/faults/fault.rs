@@ -2,6 +2,7 @@
 
 use super::fault_rng::FaultRng;
 use super::parameters::Parameters;
+use super::signature::Signature;
 use crate::plant::spec::PlantSpec;
 
 /// A fault that the plant can have.
@@ -19,6 +20,10 @@ pub struct Fault {
     pub amounts: &'static [(&'static str, f64)],
     /// Whether what it adds changes from revolution to revolution.
     pub develops: bool,
+    /// What it does in truth, where theory is clear about it.
+    pub signature: Option<Signature>,
+    /// The fault whose trace on the built-in pair it leaves as well, so that no analysis can tell the two apart.
+    pub same_trace_as: Option<&'static str>,
     /// Puts it into a plant.
     pub apply: fn(&mut PlantSpec, &Parameters),
 }
@@ -28,6 +33,12 @@ impl Fault {
     pub fn apply_usual(&self, spec: &mut PlantSpec) {
         let parameters = (self.usual)(spec);
         (self.apply)(spec, &parameters);
+    }
+
+    /// Whether no analysis can tell it from the other, or it is the other.
+    #[must_use]
+    pub fn is_confusable_with(&self, other: &Self) -> bool {
+        self.same_trace_as.unwrap_or(self.name) == other.same_trace_as.unwrap_or(other.name)
     }
 
     /// Its parameters at the usual size, phases and places at random.

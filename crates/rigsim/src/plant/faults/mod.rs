@@ -1,5 +1,5 @@
 //! Faults that the plant can have and the nominal model does not know, a file a family. Each says what it is, its usual size, how it
-//! is drawn, and how it enters the plant.
+//! is drawn, what it does in truth, and how it enters the plant.
 //!
 //! Usual sizes are those of a rig in need of attention: well above the noise, well below what one would see by eye. Names, parameters,
 //! signs and phases are those under which the diagnosis reports them. A new fault is an entry in its family's file and a line in
@@ -16,6 +16,7 @@ mod fault;
 mod fault_rng;
 mod mounting;
 mod parameters;
+mod signature;
 mod tooth_form;
 mod torques;
 mod unmodelled;
@@ -23,6 +24,7 @@ mod unmodelled;
 pub use fault::Fault;
 pub use fault_rng::FaultRng;
 pub use parameters::{Parameters, Value};
+pub use signature::{Accumulation, Carrier, Parity, Signature};
 pub use unmodelled::UNMODELLED_FAULTS;
 
 /// All faults that the diagnosis knows.
@@ -119,5 +121,17 @@ mod tests {
             fault.apply_usual(&mut spec);
         }
         assert!(Plant::new(&spec, 10_000.0, 1).is_ok());
+    }
+
+    #[test]
+    fn traces_are_shared_with_faults_that_there_are() {
+        for fault in FAULTS {
+            let first = fault.same_trace_as.map(|name| find(name).unwrap());
+            // The first of those that share a trace names no other.
+            assert!(first.is_none_or(|first| first.same_trace_as.is_none()), "{}", fault.name);
+        }
+        let alike = |a: &str, b: &str| find(a).unwrap().is_confusable_with(find(b).unwrap());
+        assert!(alike("encoder2_eccentricity", "phasing_error") && alike("slip", "slip"));
+        assert!(!alike("encoder1_ellipticity", "encoder2_ellipticity"));
     }
 }

@@ -3,6 +3,7 @@
 use super::fault::Fault;
 use super::fault_rng::FaultRng;
 use super::parameters::Parameters;
+use super::signature::Signature;
 use crate::plant::spec::PlantSpec;
 
 /// Gear 1 sits on its shaft with another eccentricity than documented, as after its mounting was disturbed: (+9, −6) µm on top
@@ -14,6 +15,8 @@ pub const GEAR1_ECCENTRICITY: Fault = Fault {
     vary: displaced_anywhere,
     amounts: &[("dx_mm", 1.0), ("dy_mm", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY),
+    same_trace_as: None,
     apply: |spec, parameters| spec.gears.displace_gear1(parameters.number("dx_mm"), parameters.number("dy_mm")),
 };
 
@@ -25,6 +28,8 @@ pub const GEAR2_ECCENTRICITY: Fault = Fault {
     vary: displaced_anywhere,
     amounts: &[("dx_mm", 1.0), ("dy_mm", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY),
+    same_trace_as: None,
     apply: |spec, parameters| spec.gears.displace_gear2(parameters.number("dx_mm"), parameters.number("dy_mm")),
 };
 
@@ -36,6 +41,8 @@ pub const CENTRE_DISTANCE_ERROR: Fault = Fault {
     vary: |_, usual, rng| usual.times("da_mm", rng.sign()),
     amounts: &[("da_mm", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY),
+    same_trace_as: None,
     apply: |spec, parameters| spec.gears.centre_distance_error_mm += parameters.number("da_mm"),
 };
 
@@ -47,6 +54,8 @@ pub const PHASING_ERROR: Fault = Fault {
     vary: |_, usual, rng| usual.times("delta_rad", rng.sign()),
     amounts: &[("delta_rad", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY_EVEN),
+    same_trace_as: Some("encoder1_eccentricity"),
     apply: |spec, parameters| spec.encoders.input.clocking_rad += parameters.number("delta_rad"),
 };
 
@@ -59,6 +68,8 @@ pub const BEARING_CLEARANCE: Fault = Fault {
     vary: |_, usual, _| usual,
     amounts: &[("c_mm", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY_ODD),
+    same_trace_as: Some("backlash_error"),
     apply: |spec, parameters| spec.bearings.clearance_mm += parameters.number("c_mm"),
 };
 

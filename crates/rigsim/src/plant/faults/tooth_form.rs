@@ -3,6 +3,7 @@
 use super::fault::Fault;
 use super::fault_rng::FaultRng;
 use super::parameters::{Parameters, Value};
+use super::signature::{Carrier, Parity, Signature};
 use crate::plant::flank::Flank;
 use crate::plant::spec::PlantSpec;
 use crate::plant::teeth::{DamageSpec, ProfileOrder};
@@ -15,6 +16,8 @@ pub const BACKLASH_ERROR: Fault = Fault {
     vary: |_, usual, rng| usual.times("dj_mm", rng.sign()),
     amounts: &[("dj_mm", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY_ODD),
+    same_trace_as: None,
     apply: |spec, parameters| spec.gears.backlash_mm += parameters.number("dj_mm"),
 };
 
@@ -26,6 +29,8 @@ pub const PITCH_CURVE_ERROR: Fault = Fault {
     vary: |_, usual, rng| usual.times("dk", rng.sign()),
     amounts: &[("dk", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY_EVEN),
+    same_trace_as: Some("encoder1_eccentricity"),
     apply: |spec, parameters| spec.gears.eccentricity += parameters.number("dk"),
 };
 
@@ -38,6 +43,8 @@ pub const PITCH_ERRORS: Fault = Fault {
     vary: |spec, _, rng| misplaced_teeth(spec, rng),
     amounts: &[("ccw_mm", 1.0), ("cw_mm", 1.0)],
     develops: false,
+    signature: None,
+    same_trace_as: None,
     apply: |spec, parameters| {
         (spec.teeth.ccw_mm, spec.teeth.cw_mm) = (parameters.numbers("ccw_mm"), parameters.numbers("cw_mm"));
     },
@@ -83,6 +90,8 @@ pub const PROFILE_ERROR: Fault = Fault {
     },
     amounts: &[("a1_mm", 1.0), ("a2_mm", 1.0), ("a3_mm", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY_EVEN.over(Carrier::Mesh)),
+    same_trace_as: None,
     apply: |spec, parameters| {
         spec.teeth.profile = [(1, "a1_mm", "ph1_rad"), (2, "a2_mm", "ph2_rad"), (3, "a3_mm", "ph3_rad")]
             .map(|(order, amplitude, phase)| ProfileOrder {
@@ -108,6 +117,8 @@ pub const TOOTH_DAMAGE: Fault = Fault {
     },
     amounts: &[("depth_mm", 1.0)],
     develops: false,
+    signature: Some(Signature { parity: Some(Parity::OneFlank), ..Signature::STEADY }),
+    same_trace_as: None,
     apply: |spec, parameters| {
         spec.teeth.damage = Some(DamageSpec {
             tooth: parameters.number("tooth") as u32,

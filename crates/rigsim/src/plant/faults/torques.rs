@@ -2,6 +2,7 @@
 
 use super::fault::Fault;
 use super::parameters::Parameters;
+use super::signature::{Carrier, Signature};
 
 /// The seal at the output encoder drags with 1.5 N·m: its torque twists all shafts before it, flips with the sense, and is no part
 /// of the known load.
@@ -12,6 +13,8 @@ pub const FRICTION_WINDUP: Fault = Fault {
     vary: |_, usual, _| usual,
     amounts: &[("torque_nm", 1.0)],
     develops: false,
+    signature: Some(Signature::STEADY_ODD),
+    same_trace_as: None,
     apply: |spec, parameters| spec.shafts.seal_drag_nm += parameters.number("torque_nm"),
 };
 
@@ -23,6 +26,8 @@ pub const BRAKE_TORQUE_RIPPLE: Fault = Fault {
     vary: |_, usual, rng| usual.with("n", 1.0 + rng.below(8) as f64).with("phase_rad", rng.angle()),
     amounts: &[("rho", 1.0)],
     develops: false,
+    signature: Some(Signature::WINDUP.over(Carrier::Output)),
+    same_trace_as: None,
     apply: |spec, parameters| {
         let brake = &mut spec.brake;
         (brake.ripple_ratio, brake.ripple_order) = (parameters.number("rho"), parameters.number("n") as u32);

@@ -12,6 +12,8 @@ pub const MOUNT_CREEP: Fault = Fault {
     vary: |_, usual, rng| usual.times("rad_per_s", rng.sign()),
     amounts: &[("rad_per_s", 1.0)],
     develops: true,
+    signature: None,
+    same_trace_as: None,
     apply: |spec, parameters| spec.oddities.push(Oddity::Drift { rad_per_s: parameters.number("rad_per_s") }),
 };
 
@@ -25,6 +27,8 @@ pub const SETTLING_SEAT: Fault = Fault {
     },
     amounts: &[("a_rad", 1.0)],
     develops: true,
+    signature: None,
+    same_trace_as: None,
     apply: |spec, parameters| {
         spec.oddities.push(Oddity::Settling {
             sense: parameters.number("sense"),

@@ -17,6 +17,8 @@ pub const KNOCKS: Fault = Fault {
     },
     amounts: &[("a_rad", 1.0)],
     develops: true,
+    signature: None,
+    same_trace_as: None,
     apply: |spec, parameters| {
         spec.oddities.push(Oddity::Knocks {
             per_minute: parameters.number("per_minute"),
@@ -35,6 +37,8 @@ pub const GLITCH_BURSTS: Fault = Fault {
     vary: |_, usual, rng| usual.with("per_minute", rng.spread(2.0, 8.0)).with("length_s", rng.spread(0.05, 0.3)),
     amounts: &[("a_rad", 1.0)],
     develops: true,
+    signature: None,
+    same_trace_as: None,
     apply: |spec, parameters| {
         spec.oddities.push(Oddity::Bursts {
             per_minute: parameters.number("per_minute"),

@@ -12,6 +12,8 @@ const WAVE: Fault = Fault {
     vary: any_phase,
     amounts: &[("a_rad", 1.0)],
     develops: false,
+    signature: None,
+    same_trace_as: None,
     apply: |_, _| {},
 };
 
