@@ -4,7 +4,7 @@ use wire::modbus::{ExceptionCode, MAX_READ_COUNT, Request, Response};
 use wire::rd60xx::{Map, Model, Protection, address};
 use wire::register_map::RegisterDef;
 
-use super::{BrakeCoil, Reply, read_words};
+use super::interface::{BrakeCoil, Reply, read_words};
 
 /// Registers of the device: 0 to the last preset.
 const REGISTERS: usize = 120;

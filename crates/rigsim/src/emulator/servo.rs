@@ -7,8 +7,8 @@
 use wire::asda_b2::{self as drive, InputFunction, Outputs};
 use wire::modbus::{ExceptionCode, Request, Response};
 
+use super::interface::{Reply, ServoAxis, read_words};
 use super::parameters::Parameters;
-use super::{Reply, ServoAxis, read_words};
 
 /// Time the drive takes to answer, before P3-07 is added, ns.
 const PROCESSING_NS: u64 = 1_000_000;
@@ -375,5 +375,4 @@ impl ServoEmulator {
 }
 
 #[cfg(test)]
-#[path = "servo_tests.rs"]
 mod tests;
