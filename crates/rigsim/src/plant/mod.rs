@@ -12,12 +12,14 @@
 //! | servo drive | `servo` |
 //! | powder brake, its hysteresis, its stick-slip | `brake`, `hysteresis`, `stick_slip` |
 //! | encoders, counters, skew between them, a soft coupling | `encoder`, `skew`, `resonance` |
-//! | displacements of a reading that no known effect makes | `oddity` |
+//! | displacements of a reading that no known effect makes | `reading_error` |
 //! | bearings' run-out, slipping clamp, lost counts | `run_out`, `slippage` |
 //! | faults that the nominal model does not know | [`faults`] |
+//! | everything put together and advanced sample by sample | `assembly` |
 //!
 //! Same specification, seed and sequence of calls give the same samples, bit for bit.
 
+mod assembly;
 mod brake;
 mod chain;
 mod encoder;
@@ -27,9 +29,8 @@ mod flank;
 mod geometry;
 mod hysteresis;
 mod mesh;
-mod oddity;
+mod reading_error;
 mod resonance;
-mod rig;
 mod run_out;
 mod servo;
 mod skew;
@@ -41,6 +42,7 @@ mod teeth;
 #[cfg(test)]
 mod tests;
 
+pub use assembly::{Plant, Sample, Truth};
 pub use brake::{BrakeCurvePoint, BrakeSpec, STICK_SLIP_LIMIT_RPM};
 pub use encoder::{CountLossSpec, EncoderSpec, EncodersSpec};
 pub use error::PlantError;
@@ -48,9 +50,8 @@ pub use faults::{FAULTS, UNMODELLED_FAULTS};
 pub use flank::Flank;
 pub use geometry::GearSpec;
 pub use mesh::{BearingSpec, DEFAULT_MESH_COMPLIANCE_MM2_RAD_PER_NM, HousingSpec, MeshSpec};
-pub use oddity::{Carrier, Oddity, Weight};
+pub use reading_error::{Abscissa, ReadingError, Weight};
 pub use resonance::SoftCouplingSpec;
-pub use rig::{Plant, Sample, Truth};
 pub use run_out::NoiseSpec;
 pub use servo::DriveSpec;
 pub use slippage::ClampSpec;

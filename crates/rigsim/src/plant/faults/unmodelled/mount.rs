@@ -2,7 +2,7 @@
 
 use crate::plant::faults::fault::Fault;
 use crate::plant::faults::parameters::Parameters;
-use crate::plant::oddity::Oddity;
+use crate::plant::reading_error::ReadingError;
 
 /// The output encoder's mount creeps steadily, turning or not.
 pub const MOUNT_CREEP: Fault = Fault {
@@ -14,7 +14,9 @@ pub const MOUNT_CREEP: Fault = Fault {
     develops: true,
     signature: None,
     same_trace_as: None,
-    apply: |spec, parameters| spec.oddities.push(Oddity::Drift { rad_per_s: parameters.number("rad_per_s") }),
+    apply: |spec, parameters| {
+        spec.reading_errors.push(ReadingError::Drift { rad_per_s: parameters.number("rad_per_s") })
+    },
 };
 
 /// After a reversal into one sense the output encoder's seat settles over a turn or two; after the other it does not.
@@ -30,7 +32,7 @@ pub const SETTLING_SEAT: Fault = Fault {
     signature: None,
     same_trace_as: None,
     apply: |spec, parameters| {
-        spec.oddities.push(Oddity::Settling {
+        spec.reading_errors.push(ReadingError::Settling {
             sense: parameters.number("sense"),
             size_rad: parameters.number("a_rad"),
             travel_rad: parameters.number("travel_rad"),

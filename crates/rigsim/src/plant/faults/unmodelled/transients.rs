@@ -2,7 +2,7 @@
 
 use crate::plant::faults::fault::Fault;
 use crate::plant::faults::parameters::Parameters;
-use crate::plant::oddity::Oddity;
+use crate::plant::reading_error::ReadingError;
 
 /// Somebody knocks against the rig now and then; the mount of the output encoder rings out.
 pub const KNOCKS: Fault = Fault {
@@ -20,7 +20,7 @@ pub const KNOCKS: Fault = Fault {
     signature: None,
     same_trace_as: None,
     apply: |spec, parameters| {
-        spec.oddities.push(Oddity::Knocks {
+        spec.reading_errors.push(ReadingError::Knocks {
             per_minute: parameters.number("per_minute"),
             size_rad: parameters.number("a_rad"),
             decay_s: parameters.number("decay_s"),
@@ -40,7 +40,7 @@ pub const GLITCH_BURSTS: Fault = Fault {
     signature: None,
     same_trace_as: None,
     apply: |spec, parameters| {
-        spec.oddities.push(Oddity::Bursts {
+        spec.reading_errors.push(ReadingError::Bursts {
             per_minute: parameters.number("per_minute"),
             length_s: parameters.number("length_s"),
             size_rad: parameters.number("a_rad"),

@@ -2,7 +2,7 @@
 
 use crate::plant::faults::fault::{Fault, any_phase};
 use crate::plant::faults::parameters::Parameters;
-use crate::plant::oddity::{Carrier, Oddity, Weight};
+use crate::plant::reading_error::{Abscissa, ReadingError, Weight};
 
 /// A wave of 40 µrad, a size that shows; each fault says over what it runs.
 const WAVE: Fault = Fault {
@@ -18,9 +18,9 @@ const WAVE: Fault = Fault {
 };
 
 /// A wave of the fault's own size `a_rad` and phase `phase_rad`.
-fn wave(parameters: &Parameters, carrier: Carrier, order: f64, weight: Weight) -> Oddity {
-    Oddity::Wave {
-        carrier,
+fn wave(parameters: &Parameters, abscissa: Abscissa, order: f64, weight: Weight) -> ReadingError {
+    ReadingError::Wave {
+        abscissa,
         order,
         amplitude_rad: parameters.number("a_rad"),
         phase_rad: parameters.number("phase_rad"),
@@ -34,7 +34,7 @@ pub const THREE_JAW_DISTORTION: Fault = Fault {
     name: "three_jaw_distortion",
     summary: "output encoder's hub squeezed by a three-jaw chuck",
     apply: |spec, parameters| {
-        spec.oddities.push(wave(parameters, Carrier::Output, 3.0, Weight::Constant));
+        spec.reading_errors.push(wave(parameters, Abscissa::Output, 3.0, Weight::Constant));
     },
     ..WAVE
 };
@@ -44,7 +44,7 @@ pub const HUB_DISTORTION: Fault = Fault {
     name: "hub_distortion",
     summary: "output hub gives way five times a turn with √T",
     apply: |spec, parameters| {
-        spec.oddities.push(wave(parameters, Carrier::Output, 5.0, Weight::RootLoad));
+        spec.reading_errors.push(wave(parameters, Abscissa::Output, 5.0, Weight::RootLoad));
     },
     ..WAVE
 };
@@ -57,7 +57,7 @@ pub const PICKUP: Fault = Fault {
     vary: |spec, usual, rng| any_phase(spec, usual, rng).with("f_hz", rng.spread(2.0, 60.0)),
     develops: true,
     apply: |spec, parameters| {
-        spec.oddities.push(wave(parameters, Carrier::Time, parameters.number("f_hz"), Weight::Constant));
+        spec.reading_errors.push(wave(parameters, Abscissa::Time, parameters.number("f_hz"), Weight::Constant));
     },
     ..WAVE
 };
@@ -71,7 +71,7 @@ pub const AIR_CONDITIONING: Fault = Fault {
     develops: true,
     apply: |spec, parameters| {
         let frequency_hz = 1.0 / parameters.number("period_s").max(1e-3);
-        spec.oddities.push(wave(parameters, Carrier::Time, frequency_hz, Weight::Constant));
+        spec.reading_errors.push(wave(parameters, Abscissa::Time, frequency_hz, Weight::Constant));
     },
     ..WAVE
 };
@@ -84,7 +84,7 @@ pub const BELT_DRIVE: Fault = Fault {
     vary: |spec, usual, rng| any_phase(spec, usual, rng).with("order", rng.between(0.15, 0.85)),
     develops: true,
     apply: |spec, parameters| {
-        spec.oddities.push(wave(parameters, Carrier::Input, parameters.number("order"), Weight::Constant));
+        spec.reading_errors.push(wave(parameters, Abscissa::Input, parameters.number("order"), Weight::Constant));
     },
     ..WAVE
 };
@@ -94,7 +94,7 @@ pub const LOOSE_COUPLING: Fault = Fault {
     name: "loose_coupling",
     summary: "coupling spreads with the square of the speed",
     apply: |spec, parameters| {
-        spec.oddities.push(wave(parameters, Carrier::Input, 4.0, Weight::SpeedSquared));
+        spec.reading_errors.push(wave(parameters, Abscissa::Input, 4.0, Weight::SpeedSquared));
     },
     ..WAVE
 };
@@ -106,7 +106,7 @@ pub const KEYWAY: Fault = Fault {
     usual: |spec| (WAVE.usual)(spec).with("sense", 1.0),
     vary: |spec, usual, rng| any_phase(spec, usual, rng).with("sense", rng.sign()),
     apply: |spec, parameters| {
-        spec.oddities.push(wave(parameters, Carrier::Input, 7.0, Weight::Sense(parameters.number("sense"))));
+        spec.reading_errors.push(wave(parameters, Abscissa::Input, 7.0, Weight::Sense(parameters.number("sense"))));
     },
     ..WAVE
 };
@@ -117,7 +117,7 @@ pub const GROWING_WOBBLE: Fault = Fault {
     summary: "hub works loose, six waves a turn growing with time",
     develops: true,
     apply: |spec, parameters| {
-        spec.oddities.push(wave(parameters, Carrier::Output, 6.0, Weight::Age(300.0)));
+        spec.reading_errors.push(wave(parameters, Abscissa::Output, 6.0, Weight::Age(300.0)));
     },
     ..WAVE
 };
@@ -129,8 +129,8 @@ pub const BIT_WEIGHT: Fault = Fault {
     usual: |spec| (WAVE.usual)(spec).with("order", 32.0),
     vary: |spec, usual, rng| any_phase(spec, usual, rng).with("order", 2f64.powi(4 + rng.below(4) as i32)),
     apply: |spec, parameters| {
-        spec.oddities.push(Oddity::Wave {
-            carrier: Carrier::Output,
+        spec.reading_errors.push(ReadingError::Wave {
+            abscissa: Abscissa::Output,
             order: parameters.number("order"),
             amplitude_rad: parameters.number("a_rad"),
             phase_rad: parameters.number("phase_rad"),

@@ -7,7 +7,7 @@ use super::error::{PlantError, in_range};
 use super::flank::Flank;
 use super::geometry::PitchCurves;
 use super::mesh::Mesh;
-use super::oddity::{Running, Surroundings};
+use super::reading_error::{ActiveReadingError, RigState};
 use super::resonance::SoftCoupling;
 use super::run_out::RunOut;
 use super::servo::Servo;
@@ -84,7 +84,7 @@ pub struct Plant {
     coupling: Option<SoftCoupling>,
     /// Lead of the output encoder's disc over its shaft, rad.
     coupling_twist_rad: f64,
-    oddities: Vec<Running>,
+    reading_errors: Vec<ActiveReadingError>,
     /// When the housing began to warm up, s.
     warming_since_s: f64,
     wear_mm: f64,
@@ -134,7 +134,10 @@ impl Plant {
             skew: None,
             coupling: spec.encoders.output_coupling.map(|coupling| SoftCoupling::new(coupling, 0.0)),
             coupling_twist_rad: 0.0,
-            oddities: (10..).zip(&spec.oddities).map(|(n, oddity)| Running::new(oddity, stream(seed, n))).collect(),
+            reading_errors: (10..)
+                .zip(&spec.reading_errors)
+                .map(|(n, error)| ActiveReadingError::new(error, stream(seed, n)))
+                .collect(),
             warming_since_s: 0.0,
             wear_mm: 0.0,
             clamp_slip_rad: 0.0,
@@ -204,8 +207,8 @@ impl Plant {
             }
         }
         output_rad += self.coupling_twist_rad;
-        if !self.oddities.is_empty() {
-            let rig = Surroundings {
+        if !self.reading_errors.is_empty() {
+            let rig = RigState {
                 time_s: self.time_s(),
                 dt_s: 1.0 / self.sample_rate_hz,
                 theta1_rad: self.chain.q[INPUT],
@@ -213,7 +216,7 @@ impl Plant {
                 speed_rad_per_s: self.chain.v[INPUT],
                 load_nm: self.chain.load_torque_nm,
             };
-            output_rad += self.oddities.iter_mut().map(|oddity| oddity.advance(&rig)).sum::<f64>();
+            output_rad += self.reading_errors.iter_mut().map(|error| error.advance(&rig)).sum::<f64>();
         }
         Sample { input_counts: self.input.read(input_rad), output_counts: self.output.read(output_rad) }
     }
