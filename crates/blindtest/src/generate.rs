@@ -1,16 +1,15 @@
-//! Draws the faults of a case and makes its rig: which effects, in which place, at which size.
+//! Generates a case: draws its faults and makes its rig. Which effects, in which place, at which size.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use serde::{Deserialize, Serialize};
-
-use super::BlindError;
-use super::campaign::{self, Campaign, CampaignPlan};
+use super::campaign::{self, WithheldCampaign, WithheldPlan};
 use super::conditions::Conditions;
+use super::error::BlindError;
 use super::family::{Family, SINGLE_SIZES_RAD};
+use super::label::{Label, LabelledEffect};
+use super::plant_of_pair::plant_of_pair;
 use super::size::Baseline;
-use crate::plant_of_pair::plant_of_pair;
 use riglog::pair;
 use rigsim::plant::PlantSpec;
 use rigsim::plant::faults::{FAULTS, Fault, FaultRng, Parameters, UNMODELLED_FAULTS, find};
@@ -22,46 +21,10 @@ const OUTSIDE_RAD: (f64, f64) = (15e-6, 60e-6);
 /// A size is met this well.
 const TOLERANCE: f64 = 0.04;
 
-/// One effect of a label.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LabelledEffect {
-    /// Its name.
-    pub name: String,
-    /// Whether the diagnosis does not know it.
-    pub outside: bool,
-    /// Its parameters, under the diagnosis' names.
-    pub parameters: Parameters,
-    /// RMS of what it alone adds to TE over the campaign, rad.
-    pub rms_rad: f64,
-}
-
-/// What was drawn.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Label {
-    /// Seed of the set.
-    pub seed: u64,
-    /// Number of the case in the set.
-    pub case: usize,
-    /// Family.
-    pub family: Family,
-    /// The effects.
-    pub effects: Vec<LabelledEffect>,
-    /// RMS of what all of them add together, rad.
-    pub rms_rad: f64,
-    /// Effects that the diagnosis is told to do without.
-    pub exclude: Vec<String>,
-    /// White noise, rad RMS a sample.
-    pub white_rad: f64,
-    /// Scatter between revolutions, rad RMS.
-    pub run_out_rad: f64,
-    /// Sampling, Hz.
-    pub rate_hz: f64,
-}
-
 /// A case: what was recorded, the pair that its log names, and what was wrong.
 pub struct Case {
     /// The recording.
-    pub campaign: Campaign,
+    pub campaign: WithheldCampaign,
     /// The nominal pair.
     pub pair_toml: String,
     /// The draw.
@@ -72,7 +35,7 @@ pub struct Case {
 pub type Baselines = Mutex<HashMap<u64, Arc<Baseline>>>;
 
 /// The sound rig of a case, measured once.
-fn baseline_of(known: &Baselines, sound: &PlantSpec, plan: &CampaignPlan) -> Result<Arc<Baseline>, BlindError> {
+fn baseline_of(known: &Baselines, sound: &PlantSpec, plan: &WithheldPlan) -> Result<Arc<Baseline>, BlindError> {
     let key = sound.mesh.compliance_mm2_rad_per_nm.to_bits();
     let found = known.lock().unwrap_or_else(PoisonError::into_inner).get(&key).map(Arc::clone);
     if let Some(baseline) = found {
@@ -83,12 +46,12 @@ fn baseline_of(known: &Baselines, sound: &PlantSpec, plan: &CampaignPlan) -> Res
     Ok(baseline)
 }
 
-/// Makes case `number` of the set `seed`: `family` and how many of that family came before it are those of
+/// Generates case `number` of the set `seed`: `family` and how many of that family came before it are those of
 /// [`super::family::of_case`].
 ///
 /// # Errors
 /// [`BlindError`] for a pair without simulated gears, and for an effect that no rig can have at its size.
-pub fn make(
+pub fn generate_case(
     seed: u64,
     number: usize,
     (family, before): (Family, usize),
@@ -111,7 +74,7 @@ pub fn make(
     );
     let mut sound = plant_of_pair(&nominal)?;
     conditions.apply(&mut sound);
-    let plan = CampaignPlan::usual(conditions.rate_hz);
+    let plan = WithheldPlan::usual(conditions.rate_hz);
 
     let mut spec = sound.clone();
     let mut effects = Vec::new();
@@ -210,7 +173,7 @@ fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Fa
 struct Sizing<'a> {
     sound: &'a PlantSpec,
     baseline: &'a Baseline,
-    plan: &'a CampaignPlan,
+    plan: &'a WithheldPlan,
     seed: u64,
 }
 
@@ -322,12 +285,15 @@ mod tests {
     fn a_drawn_effect_has_its_size_and_the_same_seed_draws_the_same() {
         let (pair_toml, _) = pair::load(None).unwrap();
         let known = Baselines::default();
-        let case = make(5, 9, (Family::Single, 9), &pair_toml, &known).unwrap();
+        let case = generate_case(5, 9, (Family::Single, 9), &pair_toml, &known).unwrap();
         let effect = &case.label.effects[0];
         let wanted = SINGLE_SIZES_RAD[9 % 4];
         assert!((effect.rms_rad / wanted - 1.0).abs() < 2.0 * TOLERANCE, "{} {}", effect.name, effect.rms_rad);
-        let again = make(5, 9, (Family::Single, 9), &pair_toml, &known).unwrap();
+        let again = generate_case(5, 9, (Family::Single, 9), &pair_toml, &known).unwrap();
         assert!(again.label == case.label && again.campaign == case.campaign);
-        assert_ne!(make(6, 9, of_case(9, Some(Family::Single)), &pair_toml, &known).unwrap().label, case.label);
+        assert_ne!(
+            generate_case(6, 9, of_case(9, Some(Family::Single)), &pair_toml, &known).unwrap().label,
+            case.label
+        );
     }
 }
