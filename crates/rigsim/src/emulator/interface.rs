@@ -1,6 +1,6 @@
 //! What an emulator meets on either side: the plant behind it, and what it answers on its line.
 
-use wire::modbus::{ExceptionCode, Response};
+use wire::modbus::{ExceptionCode, Request, Response};
 
 /// The servo's side of the plant. Speeds are those of the motor.
 pub trait ServoAxis {
@@ -61,4 +61,13 @@ pub(super) fn read_words(address: u16, count: u16, limit: u16, mut word: impl Fn
     }
     let words: Option<Vec<u16>> = (0..count).map(|n| address.checked_add(n).and_then(&mut word)).collect();
     words.map_or(Response::Exception(ExceptionCode::IllegalDataAddress), Response::Registers)
+}
+
+/// Answer to a write: its echo if the device took the words.
+pub(super) fn echo_write(request: &Request, taken: Result<(), ExceptionCode>) -> Response {
+    match (taken, request) {
+        (Err(code), _) => Response::Exception(code),
+        (Ok(()), &Request::WriteSingle { address, value }) => Response::WroteSingle { address, value },
+        (Ok(()), other) => Response::WroteMultiple { address: other.address(), count: other.count() },
+    }
 }

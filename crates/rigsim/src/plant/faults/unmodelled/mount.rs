@@ -15,7 +15,7 @@ pub const MOUNT_CREEP: Fault = Fault {
     signature: None,
     same_trace_as: None,
     apply: |spec, parameters| {
-        spec.reading_errors.push(ReadingError::Drift { rad_per_s: parameters.number("rad_per_s") })
+        spec.reading_errors.push(ReadingError::Drift { rad_per_s: parameters.number("rad_per_s") });
     },
 };
 
