@@ -1,19 +1,22 @@
-//! Withheld data: campaigns on the simulated rig whose faults nobody is told, and the scoring of whoever names them.
+//! `blindtest` makes withheld data, campaigns on the simulated rig whose faults nobody is told, and scores whoever names them. It
+//! stands where both sides meet: on `rigsim`, whose faults it draws and whose truths it seals, on `riglog`, in whose logs they come,
+//! and on `diagnosis`, which it asks by the way that people take; `gearmodel` gives it the nominal pair and nothing of its effects.
+//! Above it, `rigd` has it behind `rigd sim --withhold` and `rigd blindtest`.
 //!
 //! | step | file |
 //! |---|---|
-//! | what can be drawn, and how often | `family` |
+//! | what can be drawn, and how often | [`family`] |
 //! | noise, sampling and discs of a case | `conditions` |
-//! | a sound rig with the gears of a nominal pair | `plant_of_pair` |
-//! | which effects, how large, where | `generate`, `size` |
-//! | driving the rig | `campaign` |
-//! | the log without a trace of the draw | `log` |
-//! | the label, sealed by a salted hash | `seal` |
-//! | cases as files | `set` |
-//! | asking the diagnosis | `query` |
-//! | one answer against its label | `case_score`, `signature` |
-//! | many answers: rates, calibration, power, coverage | `score`, `calibration` |
-//! | the report | `report`, `page` |
+//! | a sound rig with the gears of a nominal pair | [`plant_of_pair`] |
+//! | which effects, how large, where | [`generate`], [`size`] |
+//! | driving the rig | [`campaign`] |
+//! | the log without a trace of the draw | [`mod@log`] |
+//! | the truth, sealed by a salted hash | [`label`], [`seal`] |
+//! | cases as files | [`set`] |
+//! | asking the diagnosis | [`query`] |
+//! | one answer against its label | [`case_score`], `signature` |
+//! | many answers: rates, calibration, power, coverage | [`score`], [`calibration`] |
+//! | the report | [`report`], [`page`] |
 
 pub mod calibration;
 pub mod campaign;
