@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use gearmodel::Direction;
 use riglog::proto::Phase;
 
-use super::BlindError;
+use super::error::BlindError;
 use rigsim::plant::{Plant, PlantSpec};
 
 /// Speed while homing, rpm of the driver.
@@ -35,7 +35,7 @@ pub struct RunPlan {
 
 /// What is run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CampaignPlan {
+pub struct WithheldPlan {
     /// The runs, in this order.
     pub runs: Vec<RunPlan>,
     /// Driver revolutions of each.
@@ -44,7 +44,7 @@ pub struct CampaignPlan {
     pub rate_hz: f64,
 }
 
-impl CampaignPlan {
+impl WithheldPlan {
     /// Both senses at 0.5, 5, 10 and 15 N·m and 5 rpm, and at 10 N·m and 2.5 and 10 rpm; four revolutions each.
     #[must_use]
     pub fn usual(rate_hz: f64) -> Self {
@@ -89,7 +89,7 @@ pub struct RecordedSpan {
 
 /// What a campaign recorded: all samples from switching on, the runs among them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Campaign {
+pub struct WithheldCampaign {
     /// Sampling, Hz.
     pub rate_hz: f64,
     /// Input and output counts.
@@ -108,7 +108,7 @@ pub struct Campaign {
     pub count_losses: u64,
 }
 
-impl Campaign {
+impl WithheldCampaign {
     /// θ1 and θ2 of a sample, rad.
     #[must_use]
     pub fn angles_rad(&self, sample: usize) -> [f64; 2] {
@@ -120,8 +120,8 @@ impl Campaign {
 /// The rig under way.
 struct Driver<'a> {
     plant: Plant,
-    plan: &'a CampaignPlan,
-    campaign: Campaign,
+    plan: &'a WithheldPlan,
+    campaign: WithheldCampaign,
     phase: Phase,
     run: Option<RunPlan>,
     next_state: usize,
@@ -131,12 +131,12 @@ struct Driver<'a> {
 ///
 /// # Errors
 /// [`BlindError`] for a rig that cannot be built, a load that the brake has not, and a rig that does not move.
-pub fn run(spec: &PlantSpec, plan: &CampaignPlan, seed: u64) -> Result<Campaign, BlindError> {
+pub fn run(spec: &PlantSpec, plan: &WithheldPlan, seed: u64) -> Result<WithheldCampaign, BlindError> {
     let mut plant = Plant::new(spec, plan.rate_hz, seed)?;
     plant.set_ramp_ms(RAMP_MS, RAMP_MS);
     let (input, output) = plant.counts_per_rev();
     let (input_lines, output_lines) = plant.lines();
-    let campaign = Campaign {
+    let campaign = WithheldCampaign {
         rate_hz: plan.rate_hz,
         counts: Vec::new(),
         index_counts: [0; 2],
@@ -275,7 +275,7 @@ mod tests {
 
     #[test]
     fn runs_turn_in_their_sense_for_their_revolutions_under_their_load() {
-        let mut plan = CampaignPlan::usual(500.0);
+        let mut plan = WithheldPlan::usual(500.0);
         plan.runs.truncate(4);
         plan.revolutions = 1.0;
         let campaign = run(&PlantSpec::default(), &plan, 3).unwrap();
@@ -298,7 +298,7 @@ mod tests {
     fn a_sound_rig_is_what_its_nominal_model_says() {
         let (_, model) = riglog::pair::load(None).unwrap();
         let spec = crate::plant_of_pair::plant_of_pair(&model).unwrap().quiet();
-        let mut plan = CampaignPlan::usual(250.0);
+        let mut plan = WithheldPlan::usual(250.0);
         plan.revolutions = 1.0;
         let campaign = run(&spec, &plan, 3).unwrap();
         for span in &campaign.runs {

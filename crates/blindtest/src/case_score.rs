@@ -4,15 +4,15 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::family::Family;
-use super::generate::{Label, LabelledEffect};
+use super::label::{Label, LabelledEffect};
 use super::signature;
-use rigsim::plant::undocumented::{self, find};
+use rigsim::plant::faults::{self, find};
 
 /// A group counts as an answer only where physics ties its members: under this angle, degrees.
 const TIED_UNDER_DEG: f64 = 2.0;
 /// Half width of a 90 % interval in standard deviations.
 const NINETY_PERCENT: f64 = 1.644_854;
-/// Parameters are judged where the effect is at least this probable.
+/// Parameters are scored where the effect is at least this probable.
 const NAMED_FROM: f64 = 0.5;
 
 /// What the diagnosis would stake its name on.
@@ -34,7 +34,7 @@ impl Claim {
 
 /// One true effect and what came of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Truth {
+pub struct TrueEffect {
     /// Its name.
     pub name: String,
     /// Its size alone, rad RMS.
@@ -51,15 +51,15 @@ pub struct Truth {
     pub covered: Vec<(String, bool)>,
 }
 
-/// One case, judged.
+/// One case, scored.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct CaseScore {
     /// Number of the case.
     pub case: usize,
     /// Its family.
     pub family: Family,
     /// The effects that it shall name.
-    pub truths: Vec<Truth>,
+    pub truths: Vec<TrueEffect>,
     /// What it must call unknown, if anything.
     pub hidden: Vec<String>,
     /// Claims that name no true effect.
@@ -82,17 +82,17 @@ pub struct Outcome {
     pub no_answer: Option<String>,
 }
 
-impl Outcome {
+impl CaseScore {
     /// A case that the diagnosis did not answer: nothing is named, and nothing is right, not even a null.
     #[must_use]
     pub fn unanswered(label: &Label, reason: String) -> Self {
-        Self { exact: false, no_answer: Some(reason), ..judge(label, &Value::Null, 0.0) }
+        Self { exact: false, no_answer: Some(reason), ..score_case(label, &Value::Null, 0.0) }
     }
 }
 
-/// Judges an answer (`to_dict()` of the diagnosis). Fields that are missing count as not said.
+/// Scores an answer (`to_dict()` of the diagnosis). Fields that are missing count as not said.
 #[must_use]
-pub fn judge(label: &Label, answer: &Value, seconds: f64) -> Outcome {
+pub fn score_case(label: &Label, answer: &Value, seconds: f64) -> CaseScore {
     let (mut claims, says_unknown) = claims(&answer["verdict"]);
     let groups: Vec<(Vec<String>, f64)> = list(&answer["groups"])
         .map(|group| (names(&group["members"]), group["probability"].as_f64().unwrap_or(0.0)))
@@ -113,7 +113,7 @@ pub fn judge(label: &Label, answer: &Value, seconds: f64) -> Outcome {
         let grouped = groups.iter().filter(|(members, _)| members.contains(&effect.name)).map(|(_, p)| *p);
         let probability = grouped.fold(alone, f64::max);
         let parameters = reported.map(|value| &value["parameters"]).unwrap_or(&Value::Null);
-        truths.push(Truth {
+        truths.push(TrueEffect {
             name: effect.name.clone(),
             rms_rad: effect.rms_rad,
             standard_errors: standard_errors(effect, parameters),
@@ -143,7 +143,7 @@ pub fn judge(label: &Label, answer: &Value, seconds: f64) -> Outcome {
         [only] if label.family == Family::Single => signature::right(&only.name, &answer["where"]["signature"]),
         _ => None,
     };
-    Outcome {
+    CaseScore {
         case: label.case,
         family: label.family,
         truths,
@@ -210,7 +210,7 @@ fn covered(effect: &LabelledEffect, parameters: &Value) -> Vec<(String, bool)> {
         .parameters
         .iter()
         .filter_map(|(name, value)| {
-            let undocumented::Value::Number(truth) = value else { return None };
+            let faults::Value::Number(truth) = value else { return None };
             let (value, std) = estimate(parameters, name)?;
             let mut miss = value - truth;
             if name == "phase_rad" || name.starts_with("ph") && name.ends_with("_rad") && name != "phasing_rad" {
@@ -233,7 +233,7 @@ fn shrink(label: &Label, gap: &Value) -> Option<f64> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use rigsim::plant::undocumented::Parameters;
+    use rigsim::plant::faults::Parameters;
     use serde_json::json;
 
     /// A label with these effects: name, outside, RMS in µrad.
@@ -279,38 +279,38 @@ pub(super) mod tests {
     #[test]
     fn the_truth_alone_is_exact_and_more_or_less_is_not() {
         let truth = label(Family::Pair, &[("backlash_error", false, 30.0), ("time_skew", false, 30.0)]);
-        let judged = |verdict: Value| judge(&truth, &answer(verdict, &[], 0.0), 1.0);
-        assert!(judged(json!(["time_skew", "backlash_error"])).exact);
-        let less = judged(json!(["time_skew"]));
+        let scored = |verdict: Value| score_case(&truth, &answer(verdict, &[], 0.0), 1.0);
+        assert!(scored(json!(["time_skew", "backlash_error"])).exact);
+        let less = scored(json!(["time_skew"]));
         assert!(!less.exact && less.truths[1].named && !less.truths[0].named && less.false_names.is_empty());
-        let more = judged(json!(["time_skew", "backlash_error", "slip"]));
+        let more = scored(json!(["time_skew", "backlash_error", "slip"]));
         assert!(!more.exact && more.false_names == ["slip"]);
-        assert!(!judged(json!(["time_skew", "backlash_error", "unknown"])).exact);
-        assert!(!judged(json!([])).exact);
-        assert!(judge(&label(Family::Null, &[]), &answer(json!([]), &[], 0.0), 1.0).exact);
+        assert!(!scored(json!(["time_skew", "backlash_error", "unknown"])).exact);
+        assert!(!scored(json!([])).exact);
+        assert!(score_case(&label(Family::Null, &[]), &answer(json!([]), &[], 0.0), 1.0).exact);
     }
 
     #[test]
     fn a_group_counts_where_physics_ties_it_and_for_one_truth_only() {
         let one = label(Family::Single, &[("backlash_error", false, 30.0)]);
         let group = |angle: f64| json!([{"members": ["bearing_clearance", "backlash_error"], "angle_deg": angle}]);
-        let tied = judge(&one, &answer(group(0.3), &[], 0.0), 1.0);
+        let tied = score_case(&one, &answer(group(0.3), &[], 0.0), 1.0);
         assert!(tied.exact && tied.truths[0].group_size == 2);
-        let loose = judge(&one, &answer(group(12.0), &[], 0.0), 1.0);
+        let loose = score_case(&one, &answer(group(12.0), &[], 0.0), 1.0);
         assert!(!loose.exact && loose.false_names == ["bearing_clearance | backlash_error"]);
         let two = label(Family::Pair, &[("backlash_error", false, 30.0), ("bearing_clearance", false, 30.0)]);
-        assert!(!judge(&two, &answer(group(0.3), &[], 0.0), 1.0).exact);
+        assert!(!score_case(&two, &answer(group(0.3), &[], 0.0), 1.0).exact);
     }
 
     #[test]
     fn what_is_outside_or_left_out_must_be_called_unknown() {
         let outside = label(Family::Mixed, &[("backlash_error", false, 30.0), ("knocks", true, 30.0)]);
-        assert!(judge(&outside, &answer(json!(["backlash_error", "unknown"]), &[], 1.0), 1.0).exact);
-        assert!(!judge(&outside, &answer(json!(["backlash_error"]), &[], 0.1), 1.0).exact);
+        assert!(score_case(&outside, &answer(json!(["backlash_error", "unknown"]), &[], 1.0), 1.0).exact);
+        assert!(!score_case(&outside, &answer(json!(["backlash_error"]), &[], 0.1), 1.0).exact);
         let mut left_out = label(Family::LeftOut, &[("time_skew", false, 30.0)]);
         left_out.exclude = vec!["time_skew".into()];
-        let judged = judge(&left_out, &answer(json!(["unknown"]), &[], 1.0), 1.0);
-        assert!(judged.exact && judged.truths.is_empty() && judged.hidden == ["time_skew"]);
+        let scored = score_case(&left_out, &answer(json!(["unknown"]), &[], 1.0), 1.0);
+        assert!(scored.exact && scored.truths.is_empty() && scored.hidden == ["time_skew"]);
     }
 
     #[test]
@@ -318,33 +318,33 @@ pub(super) mod tests {
         let truth = label(Family::Single, &[("backlash_error", false, 30.0)]);
         let mut said = answer(json!([]), &[("backlash_error", 0.5), ("bearing_clearance", 0.48), ("slip", 0.1)], 0.02);
         said["groups"] = json!([{"members": ["backlash_error", "bearing_clearance"], "probability": 0.98}]);
-        let judged = judge(&truth, &said, 1.0);
-        assert_eq!(judged.events, [(0.98, true), (0.1, false), (0.02, false)]);
-        assert_eq!(judged.truths[0].probability, 0.98);
+        let scored = score_case(&truth, &said, 1.0);
+        assert_eq!(scored.events, [(0.98, true), (0.1, false), (0.02, false)]);
+        assert_eq!(scored.truths[0].probability, 0.98);
     }
 
     #[test]
     fn parameters_are_covered_within_ninety_percent_and_angles_around_the_turn() {
         let truth = label(Family::Single, &[("encoder2_eccentricity", false, 30.0)]);
-        let judged = judge(&truth, &answer(json!([]), &[("encoder2_eccentricity", 0.9)], 0.0), 1.0);
-        let mut covered = judged.truths[0].covered.clone();
+        let scored = score_case(&truth, &answer(json!([]), &[("encoder2_eccentricity", 0.9)], 0.0), 1.0);
+        let mut covered = scored.truths[0].covered.clone();
         covered.sort();
         let expected = [("dj_mm", false), ("eps", true), ("phase_rad", true)];
         assert_eq!(covered, expected.map(|(name, right)| (name.to_owned(), right)));
-        assert!((judged.truths[0].standard_errors.unwrap() - 20.0).abs() < 1e-9);
+        assert!((scored.truths[0].standard_errors.unwrap() - 20.0).abs() < 1e-9);
         // 5² − 3² = 16 of (30 µrad)² = 9e-10.
-        assert!((judged.shrink.unwrap() - 16.0 / 9.0).abs() < 1e-9);
+        assert!((scored.shrink.unwrap() - 16.0 / 9.0).abs() < 1e-9);
     }
 
     #[test]
     fn no_answer_is_never_right() {
-        let judged = Outcome::unanswered(&label(Family::Null, &[]), "it refused".into());
-        assert!(!judged.exact && judged.false_names.is_empty() && judged.no_answer.is_some());
+        let scored = CaseScore::unanswered(&label(Family::Null, &[]), "it refused".into());
+        assert!(!scored.exact && scored.false_names.is_empty() && scored.no_answer.is_some());
     }
 
     #[test]
     fn an_answer_without_fields_is_an_answer_without_content() {
-        let judged = judge(&label(Family::Single, &[("slip", false, 30.0)]), &json!({}), 1.0);
-        assert!(!judged.exact && judged.events.is_empty() && judged.shrink.is_none());
+        let scored = score_case(&label(Family::Single, &[("slip", false, 30.0)]), &json!({}), 1.0);
+        assert!(!scored.exact && scored.events.is_empty() && scored.shrink.is_none());
     }
 }

@@ -1,7 +1,7 @@
 //! What differs from case to case and is no fault: noise, scatter between revolutions and runs, sampling, discs, stiffness.
 
 use rigsim::plant::PlantSpec;
-use rigsim::plant::undocumented::FaultRng;
+use rigsim::plant::faults::FaultRng;
 
 /// Mean driven radius, over which a displacement along the pitch line turns the gear, mm.
 const RADIUS_MM: f64 = 72.5;

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 
 use gearmodel::{Direction, NominalModel};
 
-use super::campaign::{self, Campaign, CampaignPlan, RunPlan};
-use rigsim::plant::undocumented::{FaultRng, Parameters, find};
+use super::campaign::{self, RunPlan, WithheldCampaign, WithheldPlan};
+use rigsim::plant::faults::{FaultRng, Parameters, find};
 
 /// Where the formula is evaluated.
 struct At {
@@ -99,10 +99,10 @@ fn formula(name: &str, p: &Parameters, x: &At) -> f64 {
     }
 }
 
-fn plan() -> CampaignPlan {
+fn plan() -> WithheldPlan {
     let condition = |direction, load_nm, speed_rpm| RunPlan { direction, load_nm, speed_rpm };
     let (ccw, cw) = (Direction::Ccw, Direction::Cw);
-    CampaignPlan {
+    WithheldPlan {
         runs: vec![
             condition(ccw, 2.0, 5.0),
             condition(cw, 2.0, 5.0),
@@ -115,15 +115,15 @@ fn plan() -> CampaignPlan {
 }
 
 /// RMS of what the effect adds, and of what its formula leaves of it, the zero of either removed.
-fn explained(name: &str, model: &NominalModel, sound: &Campaign) -> (f64, f64) {
+fn explained(name: &str, model: &NominalModel, sound: &WithheldCampaign) -> (f64, f64) {
     let mut spec = crate::plant_of_pair::plant_of_pair(model).unwrap().quiet();
-    let effect = find(name).unwrap();
-    let parameters = (effect.draw)(&spec, &mut FaultRng::new(77));
-    (effect.apply)(&mut spec, &parameters);
+    let fault = find(name).unwrap();
+    let parameters = fault.draw(&spec, &mut FaultRng::new(77));
+    (fault.apply)(&mut spec, &parameters);
     let changed = campaign::run(&spec, &plan(), 3).unwrap();
     let start = changed.runs[0].from;
     // Both rigs against the nominal model, so that they need not stand at the same angle.
-    let te = |campaign: &Campaign, run: &RunPlan, sample: usize| {
+    let te = |campaign: &WithheldCampaign, run: &RunPlan, sample: usize| {
         let [theta1, theta2] = campaign.angles_rad(sample);
         theta2 - model.pair.theta2(theta1) - model.te_rad(theta1, run.direction, run.load_nm)
     };

@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use rigsim::plant::undocumented::{FaultRng, OUTSIDE, UNDOCUMENTED};
+use rigsim::plant::faults::{FAULTS, FaultRng, UNMODELLED_FAULTS};
 
 /// Sizes at which single effects are drawn, rad RMS.
 pub const SINGLE_SIZES_RAD: [f64; 4] = [3e-6, 1e-5, 3e-5, 1e-4];
@@ -49,10 +49,10 @@ impl Family {
     pub fn shares() -> [(Self, usize); 7] {
         [
             (Self::Null, 60),
-            (Self::Single, SINGLE_SIZES_RAD.len() * UNDOCUMENTED.len()),
+            (Self::Single, SINGLE_SIZES_RAD.len() * FAULTS.len()),
             (Self::Pair, 40),
             (Self::Triple, 30),
-            (Self::Outside, 3 * OUTSIDE.len()),
+            (Self::Outside, 3 * UNMODELLED_FAULTS.len()),
             (Self::Mixed, 30),
             (Self::LeftOut, 12),
         ]

@@ -1,28 +1,19 @@
-//! Draws the faults of a case and makes its rig: which effects, in which place, at which size.
+//! Generates a case: draws its faults and makes its rig. Which effects, in which place, at which size.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use serde::{Deserialize, Serialize};
-
-use super::BlindError;
-use super::campaign::{self, Campaign, CampaignPlan};
+use super::campaign::{self, WithheldCampaign, WithheldPlan};
 use super::conditions::Conditions;
+use super::error::BlindError;
 use super::family::{Family, SINGLE_SIZES_RAD};
+use super::label::{Label, LabelledEffect};
+use super::plant_of_pair::plant_of_pair;
 use super::size::Baseline;
-use crate::plant_of_pair::plant_of_pair;
 use riglog::pair;
 use rigsim::plant::PlantSpec;
-use rigsim::plant::undocumented::{FaultRng, OUTSIDE, Parameters, UNDOCUMENTED, Undocumented, Value, find};
+use rigsim::plant::faults::{FAULTS, Fault, FaultRng, Parameters, UNMODELLED_FAULTS, find};
 
-/// Effects that leave one and the same trace on the built-in pair; no case holds two of a row, for no analysis could tell them apart.
-const TIED: &[&[&str]] = &[
-    &["encoder1_eccentricity", "encoder2_eccentricity", "pitch_curve_error", "phasing_error"],
-    &["encoder1_ellipticity", "coupling_misalignment_input"],
-    &["encoder2_ellipticity", "coupling_misalignment_output"],
-    &["backlash_error", "bearing_clearance"],
-    &["mesh_compliance", "bearing_compliance"],
-];
 /// Sizes of effects that come together, rad RMS.
 const TOGETHER_RAD: (f64, f64) = (12e-6, 60e-6);
 /// Sizes of what is outside the library, rad RMS.
@@ -30,46 +21,10 @@ const OUTSIDE_RAD: (f64, f64) = (15e-6, 60e-6);
 /// A size is met this well.
 const TOLERANCE: f64 = 0.04;
 
-/// One effect of a label.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LabelledEffect {
-    /// Its name.
-    pub name: String,
-    /// Whether the diagnosis does not know it.
-    pub outside: bool,
-    /// Its parameters, under the diagnosis' names.
-    pub parameters: Parameters,
-    /// RMS of what it alone adds to TE over the campaign, rad.
-    pub rms_rad: f64,
-}
-
-/// What was drawn.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Label {
-    /// Seed of the set.
-    pub seed: u64,
-    /// Number of the case in the set.
-    pub case: usize,
-    /// Family.
-    pub family: Family,
-    /// The effects.
-    pub effects: Vec<LabelledEffect>,
-    /// RMS of what all of them add together, rad.
-    pub rms_rad: f64,
-    /// Effects that the diagnosis is told to do without.
-    pub exclude: Vec<String>,
-    /// White noise, rad RMS a sample.
-    pub white_rad: f64,
-    /// Scatter between revolutions, rad RMS.
-    pub run_out_rad: f64,
-    /// Sampling, Hz.
-    pub rate_hz: f64,
-}
-
 /// A case: what was recorded, the pair that its log names, and what was wrong.
 pub struct Case {
     /// The recording.
-    pub campaign: Campaign,
+    pub campaign: WithheldCampaign,
     /// The nominal pair.
     pub pair_toml: String,
     /// The draw.
@@ -80,7 +35,7 @@ pub struct Case {
 pub type Baselines = Mutex<HashMap<u64, Arc<Baseline>>>;
 
 /// The sound rig of a case, measured once.
-fn baseline_of(known: &Baselines, sound: &PlantSpec, plan: &CampaignPlan) -> Result<Arc<Baseline>, BlindError> {
+fn baseline_of(known: &Baselines, sound: &PlantSpec, plan: &WithheldPlan) -> Result<Arc<Baseline>, BlindError> {
     let key = sound.mesh.compliance_mm2_rad_per_nm.to_bits();
     let found = known.lock().unwrap_or_else(PoisonError::into_inner).get(&key).map(Arc::clone);
     if let Some(baseline) = found {
@@ -91,12 +46,12 @@ fn baseline_of(known: &Baselines, sound: &PlantSpec, plan: &CampaignPlan) -> Res
     Ok(baseline)
 }
 
-/// Makes case `number` of the set `seed`: `family` and how many of that family came before it are those of
+/// Generates case `number` of the set `seed`: `family` and how many of that family came before it are those of
 /// [`super::family::of_case`].
 ///
 /// # Errors
 /// [`BlindError`] for a pair without simulated gears, and for an effect that no rig can have at its size.
-pub fn make(
+pub fn generate_case(
     seed: u64,
     number: usize,
     (family, before): (Family, usize),
@@ -107,7 +62,7 @@ pub fn make(
     let mut rng = FaultRng::new(seed ^ (number as u64 + 1).wrapping_mul(0xD134_2543_DE82_EF95));
     let chosen = choose(&mut rng, family, before);
     let size_of = |suffix: &str| {
-        let sizes = chosen.iter().filter(|(effect, _)| effect.name.ends_with(suffix)).map(|(_, rms)| *rms);
+        let sizes = chosen.iter().filter(|(fault, _)| fault.name.ends_with(suffix)).map(|(_, rms)| *rms);
         sizes.reduce(f64::max)
     };
     let nominal = pair::parse(pair_toml, "pair.toml".as_ref())?;
@@ -119,7 +74,7 @@ pub fn make(
     );
     let mut sound = plant_of_pair(&nominal)?;
     conditions.apply(&mut sound);
-    let plan = CampaignPlan::usual(conditions.rate_hz);
+    let plan = WithheldPlan::usual(conditions.rate_hz);
 
     let mut spec = sound.clone();
     let mut effects = Vec::new();
@@ -127,23 +82,24 @@ pub fn make(
     if !chosen.is_empty() {
         let baseline = baseline_of(baselines, &sound, &plan)?;
         let sizing = Sizing { sound: &sound, baseline: &baseline, plan: &plan, seed: conditions.seed };
-        for (effect, wanted_rad) in &chosen {
-            let (parameters, size_rad) = fit(effect, *wanted_rad, &sizing, &mut rng)?;
-            (effect.apply)(&mut spec, &parameters);
-            let outside = OUTSIDE.iter().any(|other| other.name == effect.name);
-            effects.push(LabelledEffect { name: effect.name.into(), outside, parameters, rms_rad: size_rad });
+        for (fault, wanted_rad) in &chosen {
+            let (parameters, size_rad) = fit(fault, *wanted_rad, &sizing, &mut rng)?;
+            (fault.apply)(&mut spec, &parameters);
+            let outside = UNMODELLED_FAULTS.iter().any(|other| other.name == fault.name);
+            effects.push(LabelledEffect { name: fault.name.into(), outside, parameters, rms_rad: size_rad });
         }
         rms_rad = match effects.as_slice() {
             [only] => only.rms_rad,
-            _ => sizing.rms_rad(&spec, chosen.iter().any(|(effect, _)| effect.develops))?,
+            _ => sizing.rms_rad(&spec, chosen.iter().any(|(fault, _)| fault.develops))?,
         };
     }
     let campaign = campaign::run(&spec, &plan, conditions.seed)?;
     for effect in effects.iter_mut().filter(|effect| effect.name == "count_loss") {
-        effect.parameters = effect.parameters.clone().with("steps", Value::Number(campaign.count_losses as f64));
+        effect.parameters = effect.parameters.clone().with("steps", campaign.count_losses as f64);
     }
     let exclude = if family == Family::LeftOut {
-        effects.iter().flat_map(|effect| tied_to(&effect.name)).map(str::to_owned).collect()
+        let hidden = |fault: &Fault| chosen.iter().any(|(chosen, _)| chosen.is_confusable_with(fault));
+        FAULTS.iter().filter(|fault| hidden(fault)).map(|fault| fault.name.to_owned()).collect()
     } else {
         Vec::new()
     };
@@ -161,14 +117,8 @@ pub fn make(
     Ok(Case { campaign, pair_toml: document(pair_toml, conditions.mesh_compliance_mm2_rad_per_nm), label })
 }
 
-/// Effects that cannot be told from `name`, itself among them.
-#[must_use]
-pub fn tied_to(name: &str) -> Vec<&str> {
-    TIED.iter().find(|row| row.contains(&name)).map_or_else(|| vec![name], |row| row.to_vec())
-}
-
 /// Which effects, and their sizes.
-fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Undocumented, f64)> {
+fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Fault, f64)> {
     /// Effects whose trace nothing else in the library resembles.
     const ALONE: [&str; 12] = [
         "time_skew",
@@ -185,22 +135,24 @@ fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Un
         "profile_error",
     ];
     let several = |rng: &mut FaultRng, count: usize| {
-        let mut chosen: Vec<(&'static Undocumented, f64)> = Vec::new();
+        let mut chosen: Vec<(&'static Fault, f64)> = Vec::new();
         while chosen.len() < count {
-            let effect = &UNDOCUMENTED[rng.below(UNDOCUMENTED.len())];
-            let tied = tied_to(effect.name);
-            if chosen.iter().all(|(other, _)| !tied.contains(&other.name)) {
-                chosen.push((effect, rng.spread(TOGETHER_RAD.0, TOGETHER_RAD.1)));
+            let fault = &FAULTS[rng.below(FAULTS.len())];
+            // No analysis could tell confusable faults of one case apart.
+            if chosen.iter().all(|(other, _)| !other.is_confusable_with(fault)) {
+                chosen.push((fault, rng.spread(TOGETHER_RAD.0, TOGETHER_RAD.1)));
             }
         }
         chosen
     };
-    let unknown = |rng: &mut FaultRng| (&OUTSIDE[before % OUTSIDE.len()], rng.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1));
+    let unknown = |rng: &mut FaultRng| {
+        (&UNMODELLED_FAULTS[before % UNMODELLED_FAULTS.len()], rng.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1))
+    };
     match family {
         Family::Null => Vec::new(),
         Family::Single => {
-            let (effect, round) = (before % UNDOCUMENTED.len(), before / UNDOCUMENTED.len());
-            vec![(&UNDOCUMENTED[effect], SINGLE_SIZES_RAD[(effect + round) % SINGLE_SIZES_RAD.len()])]
+            let (fault, round) = (before % FAULTS.len(), before / FAULTS.len());
+            vec![(&FAULTS[fault], SINGLE_SIZES_RAD[(fault + round) % SINGLE_SIZES_RAD.len()])]
         }
         Family::Pair => several(rng, 2),
         Family::Triple => several(rng, 3),
@@ -211,7 +163,7 @@ fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Un
             chosen
         }
         Family::LeftOut => find(ALONE[before % ALONE.len()])
-            .map(|effect| (effect, rng.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1)))
+            .map(|fault| (fault, rng.spread(OUTSIDE_RAD.0, OUTSIDE_RAD.1)))
             .into_iter()
             .collect(),
     }
@@ -221,7 +173,7 @@ fn choose(rng: &mut FaultRng, family: Family, before: usize) -> Vec<(&'static Un
 struct Sizing<'a> {
     sound: &'a PlantSpec,
     baseline: &'a Baseline,
-    plan: &'a CampaignPlan,
+    plan: &'a WithheldPlan,
     seed: u64,
 }
 
@@ -232,9 +184,9 @@ impl Sizing<'_> {
     }
 }
 
-/// Draws an effect and scales it to the size wanted; an effect that cannot be as large is as large as it can be.
+/// Draws a fault and scales it to the size wanted; a fault that cannot be as large is as large as it can be.
 fn fit(
-    effect: &Undocumented,
+    fault: &Fault,
     wanted_rad: f64,
     sizing: &Sizing<'_>,
     rng: &mut FaultRng,
@@ -246,23 +198,23 @@ fn fit(
     /// Steps back from what cannot be built.
     const STEPS_BACK: usize = 40;
     for _ in 0..DRAWS {
-        let mut parameters = (effect.draw)(sizing.sound, rng);
+        let mut parameters = fault.draw(sizing.sound, rng);
         let mut best = None;
         let mut limited = false;
         for _ in 0..CORRECTIONS {
             let mut measured = None;
             for _ in 0..STEPS_BACK {
-                parameters = settled(effect, parameters);
+                parameters = settled(fault, parameters);
                 let mut spec = sizing.sound.clone();
-                (effect.apply)(&mut spec, &parameters);
-                match sizing.rms_rad(&spec, effect.develops) {
+                (fault.apply)(&mut spec, &parameters);
+                match sizing.rms_rad(&spec, fault.develops) {
                     Ok(rms_rad) => {
                         measured = Some(rms_rad);
                         break;
                     }
                     Err(BlindError::Plant(_)) => {
                         limited = true;
-                        parameters = parameters.scaled(effect.amounts, 0.8);
+                        parameters = parameters.scaled(fault.amounts, 0.8);
                     }
                     Err(other) => return Err(other),
                 }
@@ -276,7 +228,7 @@ fn fit(
             if miss < TOLERANCE || (limited && rms_rad < wanted_rad) || rms_rad < 1e-7 {
                 break;
             }
-            parameters = parameters.scaled(effect.amounts, wanted_rad / rms_rad);
+            parameters = parameters.scaled(fault.amounts, wanted_rad / rms_rad);
         }
         if let Some((parameters, rms_rad, miss)) = best
             && (limited || miss < 0.5)
@@ -284,16 +236,16 @@ fn fit(
             return Ok((parameters, rms_rad));
         }
     }
-    Err(BlindError::Unfit { effect: effect.name, rms_rad: wanted_rad })
+    Err(BlindError::Unfit { effect: fault.name, rms_rad: wanted_rad })
 }
 
 /// Amounts that only come whole.
-fn settled(effect: &Undocumented, parameters: Parameters) -> Parameters {
-    if effect.name != "count_loss" {
+fn settled(fault: &Fault, parameters: Parameters) -> Parameters {
+    if fault.name != "count_loss" {
         return parameters;
     }
     let counts = parameters.number("counts");
-    parameters.with("counts", Value::Number(counts.abs().round().max(1.0).copysign(counts)))
+    parameters.with("counts", counts.abs().round().max(1.0).copysign(counts))
 }
 
 /// The pair's text with the compliance that its gears have.
@@ -313,7 +265,7 @@ mod tests {
     #[test]
     fn singles_go_through_every_effect_at_every_size() {
         let mut seen = std::collections::BTreeSet::new();
-        for n in 0..4 * UNDOCUMENTED.len() {
+        for n in 0..4 * FAULTS.len() {
             let chosen = choose(&mut FaultRng::new(1), Family::Single, n);
             assert!(seen.insert((chosen[0].0.name, (chosen[0].1 * 1e7) as u64)));
         }
@@ -323,9 +275,8 @@ mod tests {
     fn no_case_holds_what_nobody_can_tell_apart() {
         for n in 0..200 {
             let chosen = choose(&mut FaultRng::new(n), Family::Triple, 0);
-            for (k, (effect, _)) in chosen.iter().enumerate() {
-                let tied = tied_to(effect.name);
-                assert!(chosen[..k].iter().all(|(other, _)| !tied.contains(&other.name)));
+            for (k, (fault, _)) in chosen.iter().enumerate() {
+                assert!(chosen[..k].iter().all(|(other, _)| !other.is_confusable_with(fault)));
             }
         }
     }
@@ -334,12 +285,15 @@ mod tests {
     fn a_drawn_effect_has_its_size_and_the_same_seed_draws_the_same() {
         let (pair_toml, _) = pair::load(None).unwrap();
         let known = Baselines::default();
-        let case = make(5, 9, (Family::Single, 9), &pair_toml, &known).unwrap();
+        let case = generate_case(5, 9, (Family::Single, 9), &pair_toml, &known).unwrap();
         let effect = &case.label.effects[0];
         let wanted = SINGLE_SIZES_RAD[9 % 4];
         assert!((effect.rms_rad / wanted - 1.0).abs() < 2.0 * TOLERANCE, "{} {}", effect.name, effect.rms_rad);
-        let again = make(5, 9, (Family::Single, 9), &pair_toml, &known).unwrap();
+        let again = generate_case(5, 9, (Family::Single, 9), &pair_toml, &known).unwrap();
         assert!(again.label == case.label && again.campaign == case.campaign);
-        assert_ne!(make(6, 9, of_case(9, Some(Family::Single)), &pair_toml, &known).unwrap().label, case.label);
+        assert_ne!(
+            generate_case(6, 9, of_case(9, Some(Family::Single)), &pair_toml, &known).unwrap().label,
+            case.label
+        );
     }
 }

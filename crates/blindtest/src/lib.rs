@@ -1,27 +1,22 @@
-//! Withheld data: campaigns on the simulated rig whose faults nobody is told, and the scoring of whoever names them.
+//! `blindtest` makes withheld data, campaigns on the simulated rig whose faults nobody is told, and scores whoever names them. It
+//! stands where both sides meet: on `rigsim`, whose faults it draws and whose truths it seals, on `riglog`, in whose logs they come,
+//! and on `diagnosis`, which it asks by the way that people take; `gearmodel` gives it the nominal pair and nothing of its effects.
+//! Above it, `rigd` has it behind `rigd sim --withhold` and `rigd blindtest`.
 //!
 //! | step | file |
 //! |---|---|
-//! | what can be drawn, and how often | `family` |
+//! | what can be drawn, and how often | [`family`] |
 //! | noise, sampling and discs of a case | `conditions` |
-//! | a sound rig with the gears of a nominal pair | `plant_of_pair` |
-//! | which effects, how large, where | `generate`, `size` |
-//! | driving the rig | `campaign` |
-//! | the log without a trace of the draw | `log` |
-//! | the label, sealed by a salted hash | `seal` |
-//! | cases as files | `set` |
-//! | asking the diagnosis | `query` |
-//! | one answer against its label | `case_score`, `signature` |
-//! | many answers: rates, calibration, power, coverage | `score`, `calibration` |
-//! | the report | `report`, `page` |
-
-use std::path::PathBuf;
-
-use riglog::{LogError, PairError};
-use rigsim::plant::PlantError;
-use thiserror::Error;
-
-use crate::plant_of_pair::NoSimulatedGears;
+//! | a sound rig with the gears of a nominal pair | [`plant_of_pair`] |
+//! | which effects, how large, where | [`generate`], [`size`] |
+//! | driving the rig | [`campaign`] |
+//! | the log without a trace of the draw | [`mod@log`] |
+//! | the truth, sealed by a salted hash | [`label`], [`seal`] |
+//! | cases as files | [`set`] |
+//! | asking the diagnosis | [`query`] |
+//! | one answer against its label | [`case_score`], `signature` |
+//! | many answers: rates, calibration, power, coverage | [`score`], [`calibration`] |
+//! | the report | [`report`], [`page`] |
 
 pub mod calibration;
 pub mod campaign;
@@ -29,8 +24,10 @@ pub mod case_score;
 mod conditions;
 #[cfg(test)]
 mod convention_tests;
+mod error;
 pub mod family;
 pub mod generate;
+pub mod label;
 pub mod log;
 pub mod page;
 pub mod plant_of_pair;
@@ -42,61 +39,4 @@ pub mod set;
 mod signature;
 pub mod size;
 
-/// Why there is no withheld data, or no score.
-#[derive(Debug, Error)]
-pub enum BlindError {
-    /// The rig of a case cannot be built.
-    #[error("withheld case: {0}")]
-    Plant(#[from] PlantError),
-    /// The pair has no simulated gears.
-    #[error("withheld case: {0}")]
-    Gears(#[from] NoSimulatedGears),
-    /// The pair cannot be read.
-    #[error("withheld case: {0}")]
-    Pair(#[from] PairError),
-    /// The brake cannot make the load.
-    #[error("withheld case: a load of {load_nm} N·m is beyond {where_}; plan a smaller load")]
-    BeyondBrake {
-        /// The load, N·m.
-        load_nm: f64,
-        /// What ends before it.
-        where_: &'static str,
-    },
-    /// The simulated rig does not get there.
-    #[error(
-        "withheld case: waited {patience_s:.1} s of simulated time for {what}; the plan's speed or load stalls the rig"
-    )]
-    Stuck {
-        /// What was waited for.
-        what: &'static str,
-        /// How long, s.
-        patience_s: f64,
-    },
-    /// An effect could not be drawn at the size asked for.
-    #[error("withheld case: {effect} at {rms_rad:.1e} rad RMS leaves no rig that can be built; ask for a smaller size")]
-    Unfit {
-        /// The effect.
-        effect: &'static str,
-        /// The size, rad.
-        rms_rad: f64,
-    },
-    /// The log cannot be written.
-    #[error(transparent)]
-    Log(#[from] LogError),
-    /// A file cannot be read or written.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's reason.
-        source: std::io::Error,
-    },
-    /// A label cannot be understood.
-    #[error("label {}: {reason}; make the withheld data anew", path.display())]
-    Label {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-}
+pub use error::BlindError;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use riglog::proto::{self, RigState, Timestamp};
 use riglog::{BatchBuilder, EncoderMetadata, LogReader, LogWriter, Record, RunMetadata, WriterOptions};
 
-use super::BlindError;
-use super::campaign::{Campaign, State};
+use super::campaign::{State, WithheldCampaign};
+use super::error::BlindError;
 
 /// When withheld campaigns begin, ns since the Unix epoch: 2026-01-01T00:00:00Z.
 const EPOCH_NS: u64 = 1_767_225_600_000_000_000;
@@ -25,7 +25,7 @@ pub fn path(directory: &Path, number: usize) -> PathBuf {
 ///
 /// # Errors
 /// [`BlindError::Log`].
-pub fn write(path: &Path, campaign: &Campaign, pair_toml: &str, hash: &str) -> Result<(), BlindError> {
+pub fn write(path: &Path, campaign: &WithheldCampaign, pair_toml: &str, hash: &str) -> Result<(), BlindError> {
     let options =
         WriterOptions { chunk_period_ms: CHUNK_MS, ..WriterOptions::new(concat!("rigd ", env!("CARGO_PKG_VERSION"))) };
     let mut writer = LogWriter::create(path, options)?;
@@ -116,12 +116,12 @@ pub fn sealed_hash(path: &Path) -> Result<String, BlindError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::{self, CampaignPlan};
+    use crate::campaign::{self, WithheldPlan};
     use rigsim::plant::PlantSpec;
 
     #[test]
     fn the_log_holds_every_sample_and_run_and_nothing_else() {
-        let mut plan = CampaignPlan::usual(500.0);
+        let mut plan = WithheldPlan::usual(500.0);
         plan.runs.truncate(3);
         plan.revolutions = 1.0;
         let campaign = campaign::run(&PlantSpec::default(), &plan, 3).unwrap();

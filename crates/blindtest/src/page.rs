@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::report::{counts, value};
 use super::score::{LEFT_OUT, Rate, Score};
-use rigsim::plant::OUTSIDE;
+use rigsim::plant::UNMODELLED_FAULTS;
 
 /// Size of a diagram, px.
 const SIDE: f64 = 320.0;
@@ -192,7 +192,7 @@ fn confusion(page: &mut String, score: &Score) {
         for name in &said {
             let count = row.get(*name).copied().unwrap_or(0);
             let share = count as f64 / total.max(1) as f64;
-            let hidden = truth.ends_with(LEFT_OUT) || OUTSIDE.iter().any(|effect| effect.name == truth);
+            let hidden = truth.ends_with(LEFT_OUT) || UNMODELLED_FAULTS.iter().any(|effect| effect.name == truth);
             let right = *name == truth || hidden && *name == "unknown";
             let colour = if right { "23,111,44" } else { "179,38,30" };
             let text = if count == 0 { String::new() } else { count.to_string() };

@@ -1,11 +1,11 @@
-//! Many judged cases: the figures that a diagnosis is held to.
+//! Many scored cases: the figures that a diagnosis is held to.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::calibration::Calibration;
-use super::case_score::{Outcome, Truth};
+use super::case_score::{CaseScore, TrueEffect};
 use super::family::{Family, SINGLE_SIZES_RAD};
 
 /// Edges of the power curve, standard errors.
@@ -90,7 +90,7 @@ pub struct Power {
 pub struct Score {
     /// Schema of this object.
     pub schema: &'static str,
-    /// Cases judged.
+    /// Cases scored.
     pub cases: usize,
     /// Cases without an answer: number and reason.
     pub failed: Vec<(usize, String)>,
@@ -111,13 +111,13 @@ pub struct Score {
     /// Slowest and mean diagnosis, s.
     pub seconds: (f64, f64),
     /// The cases.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<CaseScore>,
 }
 
 impl Score {
-    /// Of judged cases, those without an answer among them, which count as wrong; `failed` could not even be asked.
+    /// Of scored cases, those without an answer among them, which count as wrong; `failed` could not even be asked.
     #[must_use]
-    pub fn of(outcomes: Vec<Outcome>, mut failed: Vec<(usize, String)>) -> Self {
+    pub fn of(outcomes: Vec<CaseScore>, mut failed: Vec<(usize, String)>) -> Self {
         let cases = outcomes.len() + failed.len();
         failed.extend(outcomes.iter().filter_map(|case| Some((case.case, case.no_answer.clone()?))));
         failed.sort();
@@ -143,11 +143,11 @@ impl Score {
     }
 }
 
-fn family(outcomes: &[Outcome], family: Family) -> impl Iterator<Item = &Outcome> {
+fn family(outcomes: &[CaseScore], family: Family) -> impl Iterator<Item = &CaseScore> {
     outcomes.iter().filter(move |case| case.family == family)
 }
 
-fn truths(outcomes: &[Outcome]) -> impl Iterator<Item = &Truth> {
+fn truths(outcomes: &[CaseScore]) -> impl Iterator<Item = &TrueEffect> {
     outcomes.iter().flat_map(|case| &case.truths)
 }
 
@@ -157,7 +157,7 @@ fn size_index(rms_rad: f64) -> usize {
     SINGLE_SIZES_RAD.windows(2).filter(|pair| rms_rad > (pair[0] * pair[1]).sqrt()).count()
 }
 
-fn figures(outcomes: &[Outcome], calibration: &Calibration, coverage: &BTreeMap<String, Rate>) -> Vec<Figure> {
+fn figures(outcomes: &[CaseScore], calibration: &Calibration, coverage: &BTreeMap<String, Rate>) -> Vec<Figure> {
     let exact = |of: Family| Rate::of(family(outcomes, of).map(|case| case.exact));
     let sized = |wanted: &[usize]| {
         Rate::of(
@@ -214,7 +214,7 @@ fn figures(outcomes: &[Outcome], calibration: &Calibration, coverage: &BTreeMap<
     ]
 }
 
-fn by_effect(outcomes: &[Outcome]) -> BTreeMap<String, [Rate; 4]> {
+fn by_effect(outcomes: &[CaseScore]) -> BTreeMap<String, [Rate; 4]> {
     let mut rows: BTreeMap<String, [Rate; 4]> = BTreeMap::new();
     for case in family(outcomes, Family::Single) {
         for truth in &case.truths {
@@ -225,7 +225,7 @@ fn by_effect(outcomes: &[Outcome]) -> BTreeMap<String, [Rate; 4]> {
     rows
 }
 
-fn by_outside(outcomes: &[Outcome]) -> BTreeMap<String, Rate> {
+fn by_outside(outcomes: &[CaseScore]) -> BTreeMap<String, Rate> {
     let mut rows: BTreeMap<String, Rate> = BTreeMap::new();
     for case in outcomes {
         for name in &case.hidden {
@@ -237,7 +237,7 @@ fn by_outside(outcomes: &[Outcome]) -> BTreeMap<String, Rate> {
 }
 
 /// A named truth stands on the diagonal; a missed one beside every false claim of its case, else beside "unknown" or "nothing".
-fn confusion(outcomes: &[Outcome]) -> BTreeMap<String, BTreeMap<String, usize>> {
+fn confusion(outcomes: &[CaseScore]) -> BTreeMap<String, BTreeMap<String, usize>> {
     let mut matrix: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
     let mut count = |truth: &str, said: &str| {
         *matrix.entry(truth.to_owned()).or_default().entry(said.to_owned()).or_default() += 1;
@@ -278,7 +278,7 @@ fn hidden_name(family: Family, name: &str) -> String {
     if family == Family::LeftOut { format!("{name}{LEFT_OUT}") } else { name.to_owned() }
 }
 
-fn power(outcomes: &[Outcome]) -> Vec<Power> {
+fn power(outcomes: &[CaseScore]) -> Vec<Power> {
     POWER_EDGES
         .iter()
         .enumerate()
@@ -291,7 +291,7 @@ fn power(outcomes: &[Outcome]) -> Vec<Power> {
         .collect()
 }
 
-fn coverage(outcomes: &[Outcome]) -> BTreeMap<String, Rate> {
+fn coverage(outcomes: &[CaseScore]) -> BTreeMap<String, Rate> {
     let mut rows: BTreeMap<String, Rate> = BTreeMap::new();
     for truth in truths(outcomes) {
         for (parameter, right) in &truth.covered {
@@ -305,14 +305,14 @@ fn coverage(outcomes: &[Outcome]) -> BTreeMap<String, Rate> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::case_score::judge;
+    use crate::case_score::score_case;
     use crate::case_score::tests::{answer, label};
     use serde_json::json;
 
     /// A small set with a hit, a miss, a false name and an unknown.
     pub fn set() -> Score {
         let case = |family, effects: &[(&str, bool, f64)], verdict, p: &[(&str, f64)], unknown| {
-            judge(&label(family, effects), &answer(verdict, p, unknown), 2.0)
+            score_case(&label(family, effects), &answer(verdict, p, unknown), 2.0)
         };
         let outcomes = vec![
             case(Family::Null, &[], json!([]), &[("slip", 0.01)], 0.0),

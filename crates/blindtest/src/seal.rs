@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::BlindError;
-use super::generate::Label;
+use super::error::BlindError;
+use super::label::Label;
 
 /// Directory of the labels beside the logs.
 const DIRECTORY: &str = "sealed";

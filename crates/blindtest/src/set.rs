@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use super::error::BlindError;
 use super::family::{Family, of_case};
 use super::generate::{self, Baselines};
+use super::log;
 use super::seal::Sealed;
-use super::{BlindError, log};
 
-/// What set is made.
+/// What set is generated.
 pub struct SetPlan {
     /// Seed of all draws.
     pub seed: u64,
@@ -20,12 +21,13 @@ pub struct SetPlan {
 }
 
 impl SetPlan {
-    /// Makes case `number` in `directory`: its log, and its label under seal. Gives the log's path.
+    /// Generates case `number` in `directory`: its log, and its label under seal. Gives the log's path.
     ///
     /// # Errors
     /// [`BlindError`] for a case that cannot be drawn or written.
-    pub fn make(&self, directory: &Path, number: usize) -> Result<PathBuf, BlindError> {
-        let case = generate::make(self.seed, number, of_case(number, self.family), &self.pair_toml, &self.baselines)?;
+    pub fn generate(&self, directory: &Path, number: usize) -> Result<PathBuf, BlindError> {
+        let case =
+            generate::generate_case(self.seed, number, of_case(number, self.family), &self.pair_toml, &self.baselines)?;
         let sealed = Sealed::new(&case.label);
         let path = log::path(directory, number);
         log::write(&path, &case.campaign, &case.pair_toml, &sealed.hash())?;

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::BlindError;
-use super::campaign::{self, Campaign, CampaignPlan};
+use super::campaign::{self, WithheldCampaign, WithheldPlan};
+use super::error::BlindError;
 use rigsim::plant::{Plant, PlantSpec};
 
 /// Sampling of the campaigns that only measure a size, Hz.
@@ -13,7 +13,7 @@ const BINS: usize = 720;
 
 /// The rig without any effect and without noise: TE over the driver's angle, a curve a run.
 pub struct Baseline {
-    plan: CampaignPlan,
+    plan: WithheldPlan,
     nominal: Plant,
     curves: Vec<Vec<f64>>,
 }
@@ -23,10 +23,10 @@ impl Baseline {
     ///
     /// # Errors
     /// [`BlindError`] as from [`campaign::run`].
-    pub fn measure(spec: &PlantSpec, plan: &CampaignPlan) -> Result<Self, BlindError> {
+    pub fn measure(spec: &PlantSpec, plan: &WithheldPlan) -> Result<Self, BlindError> {
         let spec = spec.clone().quiet();
         // Every revolution is like the first, and where it begins does not matter.
-        let plan = CampaignPlan { rate_hz: PROBE_RATE_HZ, revolutions: 1.0, ..plan.clone() };
+        let plan = WithheldPlan { rate_hz: PROBE_RATE_HZ, revolutions: 1.0, ..plan.clone() };
         let campaign = campaign::run(&spec, &plan, 1)?;
         let nominal = Plant::new(&spec, PROBE_RATE_HZ, 1)?;
         let curves = (0..campaign.runs.len()).map(|n| curve(&campaign, &nominal, n)).collect();
@@ -39,7 +39,7 @@ impl Baseline {
     /// # Errors
     /// [`BlindError`] as from [`campaign::run`].
     pub fn rms_rad(&self, spec: &PlantSpec, revolutions: f64, seed: u64) -> Result<f64, BlindError> {
-        let plan = CampaignPlan { revolutions, ..self.plan.clone() };
+        let plan = WithheldPlan { revolutions, ..self.plan.clone() };
         let campaign = campaign::run(&spec.clone().quiet(), &plan, seed)?;
         let (mut mean, mut square) = (0.0, 0.0);
         let weight = 1.0 / campaign.runs.len() as f64;
@@ -57,7 +57,7 @@ impl Baseline {
 }
 
 /// TE of a run in bins of the driver's turn.
-fn curve(campaign: &Campaign, nominal: &Plant, run: usize) -> Vec<f64> {
+fn curve(campaign: &WithheldCampaign, nominal: &Plant, run: usize) -> Vec<f64> {
     let span = campaign.runs[run];
     let mut sums = vec![(0.0, 0.0); BINS];
     for sample in span.from..span.to {
@@ -85,11 +85,11 @@ fn at(curve: &[f64], theta1_rad: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rigsim::plant::undocumented::find;
+    use rigsim::plant::faults::find;
 
     #[test]
     fn sizes_are_those_of_the_formulas() {
-        let mut plan = CampaignPlan::usual(1000.0);
+        let mut plan = WithheldPlan::usual(1000.0);
         plan.runs.truncate(4);
         let spec = PlantSpec::default();
         let baseline = Baseline::measure(&spec, &plan).unwrap();

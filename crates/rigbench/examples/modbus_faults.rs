@@ -1,4 +1,4 @@
-//! The long trial of the Modbus master: a cable with faults between it and a device, every value compared with what the device said.
+//! The long stress test of the Modbus master: a cable with faults between it and a device, every value compared with what the device said.
 //!
 //! ```text
 //! cargo run --release -p rigd --example modbus_faults -- --device servo --transactions 1000000            # simulated time
@@ -118,7 +118,7 @@ async fn drive(
     bus_stress::run(args.transactions, work, plan, args.seed, cable, connect, |link| timing.master(link, work)).await
 }
 
-/// A process that ends with the trial.
+/// A process that ends with the stress test.
 struct Server(Child);
 
 impl Drop for Server {

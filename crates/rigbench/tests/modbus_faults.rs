@@ -15,7 +15,7 @@ fn pipe() -> (Link, Link) {
     (Box::new(near), Box::new(far))
 }
 
-/// A trial in simulated time.
+/// A stress test in simulated time.
 fn in_simulated_time<M: Master>(
     transactions: u64,
     device: impl Device + 'static,
@@ -48,7 +48,7 @@ fn no_value_is_silently_wrong() {
     ] {
         println!("{name}: {tally:?}");
         assert_eq!(tally.silently_wrong, 0, "{name}: {:#?}", tally.examples);
-        // It must have been a trial: every fault came, and most calls got through.
+        // It must have been a test: every fault came, and most calls got through.
         for fault in Fault::ALL {
             assert!(tally.faults.get(fault.name()).is_some_and(|count| *count > 0), "{name}: no {}", fault.name());
         }

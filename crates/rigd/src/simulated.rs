@@ -1,6 +1,6 @@
-//! The simulated rig in the place of a real one: the world of `rigsim` behind this daemon's links.
+//! The simulated rig in the place of a real one: `rigsim` behind this daemon's links.
 //!
-//! The world answers the real devices' bytes over pipes in this process or, with [`serve_ptys`], over pseudo-terminals that any
+//! It answers the real devices' bytes over pipes in this process or, with [`serve_ptys`], over pseudo-terminals that any
 //! master can open. Drivers and codecs are the same either way.
 
 use std::cell::RefCell;
@@ -12,7 +12,7 @@ use blindtest::plant_of_pair::{NoSimulatedGears, plant_of_pair};
 use gearmodel::NominalModel;
 use rigsim::emulator::QsbClock;
 pub use rigsim::plant::PlantSpec;
-use rigsim::plant::undocumented::{OUTSIDE, UNDOCUMENTED, find};
+use rigsim::plant::faults::{FAULTS, Fault, UNMODELLED_FAULTS, find};
 use rigsim::pty::Terminal;
 use rigsim::shaft_record::ShaftRecord;
 use rigsim::simulated_rig::{self, SimulatedRig};
@@ -57,37 +57,37 @@ pub enum SimError {
     },
 }
 
-/// Whether the plant has an effect of this name.
+/// Whether the plant has a fault of this name.
 #[must_use]
 pub fn is_undocumented(name: &str) -> bool {
     find(name).is_some()
 }
 
-/// Names of the plant's effects.
+/// Names of the plant's faults.
 #[must_use]
 pub fn undocumented_names() -> Vec<&'static str> {
-    UNDOCUMENTED.iter().chain(OUTSIDE).map(|effect| effect.name).collect()
+    FAULTS.iter().chain(UNMODELLED_FAULTS).map(|fault| fault.name).collect()
 }
 
-/// The plant's effects, a line each.
+/// The plant's faults, a line each.
 #[must_use]
 pub fn describe_undocumented() -> String {
-    let line = |effect: &rigsim::plant::undocumented::Undocumented| format!("{:<32} {}", effect.name, effect.summary);
-    let known = UNDOCUMENTED.iter().map(line);
-    let outside = OUTSIDE.iter().map(|effect| format!("{} (outside the library)", line(effect)));
+    let line = |fault: &Fault| format!("{:<32} {}", fault.name, fault.summary);
+    let known = FAULTS.iter().map(line);
+    let outside = UNMODELLED_FAULTS.iter().map(|fault| format!("{} (outside the library)", line(fault)));
     known.chain(outside).collect::<Vec<_>>().join("\n")
 }
 
 /// The plant for a nominal pair: its gears and documented errors, and what is left undocumented.
 ///
 /// # Errors
-/// [`SimError`] for a kind of pair or an effect that the plant has not.
+/// [`SimError`] for a kind of pair or a fault that the plant has not.
 pub fn spec(model: &NominalModel, undocumented: &[String]) -> Result<PlantSpec, SimError> {
     let mut spec = plant_of_pair(model)?;
     for name in undocumented {
-        let effect = find(name)
+        let fault = find(name)
             .ok_or_else(|| SimError::Effect { name: name.clone(), known: undocumented_names().join(", ") })?;
-        effect.apply_usual(&mut spec);
+        fault.apply_usual(&mut spec);
     }
     Ok(spec)
 }
@@ -106,20 +106,20 @@ pub fn start_in_process(spec: &PlantSpec, rate_hz: f64, seed: u64) -> Result<Lin
     Ok(links_to(&Rc::new(RefCell::new(SimulatedRig::new(spec, rate_hz, seed)?))))
 }
 
-/// Links to a world within this process; a device that the world says is unplugged hangs up and cannot be dialled.
+/// Links to a rig within this process; a device that is unplugged hangs up and cannot be dialled.
 #[must_use]
-pub fn links_to(world: &Rc<RefCell<SimulatedRig>>) -> Links {
-    let shared = Rc::clone(world);
-    let dial = move |part: DeviceKind| -> Option<Link> {
+pub fn links_to(rig: &Rc<RefCell<SimulatedRig>>) -> Links {
+    let shared = Rc::clone(rig);
+    let dial = move |kind: DeviceKind| -> Option<Link> {
         let (ours, device) = tokio::io::duplex(PIPE_BYTES);
-        let (world, profile) = (Rc::clone(&shared), Profile::simulated());
-        let mut unplugged = world.borrow().plug(part)?;
+        let (rig, profile) = (Rc::clone(&shared), Profile::simulated());
+        let mut unplugged = rig.borrow().plug(kind)?;
         tokio::task::spawn_local(async move {
             let served = async {
-                match part {
-                    DeviceKind::Servo => serve::modbus(device, world, servo_slave(&profile)).await,
-                    DeviceKind::Brake => serve::modbus(device, world, brake_slave(&profile)).await,
-                    DeviceKind::Counter => serve::counter(device, world).await,
+                match kind {
+                    DeviceKind::Servo => serve::modbus(device, rig, servo_slave(&profile)).await,
+                    DeviceKind::Brake => serve::modbus(device, rig, brake_slave(&profile)).await,
+                    DeviceKind::Counter => serve::counter(device, rig).await,
                 }
             };
             tokio::select! {
@@ -191,13 +191,13 @@ pub async fn serve_ptys(
     let starter = Starter::look();
     let io = |what: String| move |source| SimError::Io { what, source };
     let directory = directory.canonicalize().map_err(io(format!("directory {}", directory.display())))?;
-    let world = Rc::new(RefCell::new(SimulatedRig::new(spec, simulated_rig::IDLE_RATE_HZ, seed)?));
+    let rig = Rc::new(RefCell::new(SimulatedRig::new(spec, simulated_rig::IDLE_RATE_HZ, seed)?));
     if let Some(path) = &extras.record {
         let record = ShaftRecord::create(path).map_err(io(format!("--record {}", path.display())))?;
-        world.borrow_mut().keep_record(record);
+        rig.borrow_mut().keep_record(record);
     }
     if extras.commands {
-        commands::listen(&world);
+        commands::listen(&rig);
     }
     let port = |name: &str| {
         let path = directory.join(name);
@@ -215,7 +215,7 @@ pub async fn serve_ptys(
     save(&written, &profile)?;
     let mut at_readers = Vec::new();
     if let Some(clocks) = extras.readers {
-        let zero_counts = world.borrow_mut().put_readers(clocks);
+        let zero_counts = rig.borrow_mut().put_readers(clocks);
         let mut by_readers = profile.clone();
         // The plant's encoders after interpolation, as cycles of four counts.
         let lines = [&spec.encoders.input, &spec.encoders.output]
@@ -224,14 +224,14 @@ pub async fn serve_ptys(
         save(&directory.join("qsb.toml"), &by_readers)?;
         for (which, name) in ["input", "output"].into_iter().enumerate() {
             let (reader, at_reader) = port(name)?;
-            tokio::task::spawn_local(serve::reader(reader, Rc::clone(&world), which));
+            tokio::task::spawn_local(serve::reader(reader, Rc::clone(&rig), which));
             at_readers.push(at_reader);
         }
     }
 
-    tokio::task::spawn_local(serve::modbus(servo, Rc::clone(&world), servo_slave(&profile)));
-    tokio::task::spawn_local(serve::modbus(brake, Rc::clone(&world), brake_slave(&profile)));
-    tokio::task::spawn_local(serve::counter(counter, Rc::clone(&world)));
+    tokio::task::spawn_local(serve::modbus(servo, Rc::clone(&rig), servo_slave(&profile)));
+    tokio::task::spawn_local(serve::modbus(brake, Rc::clone(&rig), brake_slave(&profile)));
+    tokio::task::spawn_local(serve::counter(counter, Rc::clone(&rig)));
     // Whoever has gone before `ready` was printed never learns the ports; later nobody needs to read.
     let unheard = || io("standard output".into());
     let mut out = std::io::stdout();

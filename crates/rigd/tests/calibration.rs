@@ -126,7 +126,7 @@ fn a_disc_turned_on_its_shaft_tells_its_own_errors_from_everything_elses() {
         let told = desk.json(0, &format!("calibrate encoder {which} {logs} --out @/calibration.toml --json"));
         // The plant's own disc.
         let mut spec = PlantSpec::default();
-        rigsim::plant::undocumented::find(effect).expect("an effect").apply_usual(&mut spec);
+        rigsim::plant::faults::find(effect).expect("an effect").apply_usual(&mut spec);
         let disc = if which == "input" { &spec.encoders.input } else { &spec.encoders.output };
         let orders = told["disc"]["orders"].as_array().expect("orders");
         let order = |wanted: f64| {

@@ -45,30 +45,30 @@ impl Command {
     }
 
     /// Does it.
-    pub fn perform(self, world: &mut SimulatedRig) {
+    pub fn perform(self, rig: &mut SimulatedRig) {
         match self {
-            Self::EmergencyStop(pressed) => world.press_emergency_stop(pressed),
-            Self::Heat(by_c) => world.heat_brake_by(by_c),
-            Self::Overcurrent(factor) => world.run_brake_away(factor),
-            Self::NoWatchdog => world.take_watchdog_away(),
-            Self::RestartCounter => world.restart_counter(),
-            Self::RestartReader(which) => world.restart_reader(which),
+            Self::EmergencyStop(pressed) => rig.press_emergency_stop(pressed),
+            Self::Heat(by_c) => rig.heat_brake_by(by_c),
+            Self::Overcurrent(factor) => rig.run_brake_away(factor),
+            Self::NoWatchdog => rig.take_watchdog_away(),
+            Self::RestartCounter => rig.restart_counter(),
+            Self::RestartReader(which) => rig.restart_reader(which),
         }
     }
 }
 
 /// Listens to standard input from now on; needs a local task set.
-pub fn listen(world: &Rc<RefCell<SimulatedRig>>) {
+pub fn listen(rig: &Rc<RefCell<SimulatedRig>>) {
     let (sender, mut lines) = unbounded_channel();
     // A thread, for reading a terminal cannot be waited for; it ends with the input or with the process.
     std::thread::spawn(move || {
         let _ = std::io::stdin().lock().lines().map_while(Result::ok).try_for_each(|line| sender.send(line));
     });
-    let world = Rc::clone(world);
+    let rig = Rc::clone(rig);
     tokio::task::spawn_local(async move {
         while let Some(line) = lines.recv().await {
             match Command::parse(&line) {
-                Some(command) => command.perform(&mut world.borrow_mut()),
+                Some(command) => command.perform(&mut rig.borrow_mut()),
                 None => eprintln!(
                     "'{line}' is no command; there are: estop press|release, heat CELSIUS, overcurrent FACTOR, no-watchdog, counter restart, reader input|output restart"
                 ),

@@ -11,7 +11,7 @@ use wire::modbus::{LineSettings, Request, frame_time, inter_frame_silence};
 use super::emulator::{ModbusLine, Reply};
 use super::simulated_rig::SimulatedRig;
 
-/// A Modbus slave of the world: its place on its line, and who answers.
+/// A Modbus slave of the rig: its place on its line, and who answers.
 pub struct Slave {
     unit: u8,
     line: LineSettings,
@@ -22,18 +22,18 @@ impl Slave {
     /// The servo drive.
     #[must_use]
     pub fn servo(unit: u8, line: LineSettings) -> Self {
-        Self { unit, line, handle: SimulatedRig::ask_servo }
+        Self { unit, line, handle: SimulatedRig::answer_servo }
     }
 
     /// The brake's current source.
     #[must_use]
     pub fn brake(unit: u8, line: LineSettings) -> Self {
-        Self { unit, line, handle: SimulatedRig::ask_brake }
+        Self { unit, line, handle: SimulatedRig::answer_brake }
     }
 }
 
 /// Serves a Modbus slave until its line is closed.
-pub async fn modbus(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<SimulatedRig>>, slave: Slave) {
+pub async fn modbus(mut line: impl AsyncRead + AsyncWrite + Unpin, rig: Rc<RefCell<SimulatedRig>>, slave: Slave) {
     let mut protocol = ModbusLine::new();
     let mut buffer = [0; 512];
     let silence = inter_frame_silence(slave.line.baud);
@@ -51,15 +51,15 @@ pub async fn modbus(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<Ref
                 // The request's own time on the wire: a pipe delivers it at once.
                 sleep_until(Instant::now() + frame_time(count, &slave.line)).await;
                 partial = true;
-                let mut world = world.borrow_mut();
-                world.advance();
-                protocol.receive(&buffer[..count], slave.unit, |request| (slave.handle)(&mut world, request))
+                let mut rig = rig.borrow_mut();
+                rig.advance();
+                protocol.receive(&buffer[..count], slave.unit, |request| (slave.handle)(&mut rig, request))
             }
             Err(_) => {
                 partial = false;
-                let mut world = world.borrow_mut();
-                world.advance();
-                protocol.idle(slave.unit, |request| (slave.handle)(&mut world, request))
+                let mut rig = rig.borrow_mut();
+                rig.advance();
+                protocol.idle(slave.unit, |request| (slave.handle)(&mut rig, request))
             }
         };
         let asked = Instant::now();
@@ -79,23 +79,23 @@ pub async fn modbus(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<Ref
 const BLOCKED: Duration = Duration::from_millis(5);
 
 /// Serves the counter box until its line is closed.
-pub async fn counter(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<SimulatedRig>>) {
+pub async fn counter(mut line: impl AsyncRead + AsyncWrite + Unpin, rig: Rc<RefCell<SimulatedRig>>) {
     let mut bytes = Vec::new();
     let mut sent = 0;
     let mut buffer = [0; 512];
     loop {
-        let due = world.borrow().next_frame();
+        let due = rig.borrow().next_frame();
         tokio::select! {
             biased;
             read = line.read(&mut buffer) => {
                 let Ok(count @ 1..) = read else { return };
-                let mut world = world.borrow_mut();
-                world.advance();
-                world.tell_counter(&buffer[..count]);
+                let mut rig = rig.borrow_mut();
+                rig.advance();
+                rig.tell_counter(&buffer[..count]);
             }
-            () = sleep_until(due) => world.borrow_mut().advance(),
+            () = sleep_until(due) => rig.borrow_mut().advance(),
         }
-        world.borrow_mut().take_stream(&mut bytes);
+        rig.borrow_mut().take_stream(&mut bytes);
         // A frame once begun is ended, however late; while it waits, the box drops whole frames.
         let blocked = loop {
             if sent == bytes.len() {
@@ -109,7 +109,7 @@ pub async fn counter(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<Re
         };
         bytes.drain(..sent);
         sent = 0;
-        world.borrow_mut().set_line_blocked(blocked);
+        rig.borrow_mut().set_line_blocked(blocked);
     }
 }
 
@@ -117,7 +117,7 @@ pub async fn counter(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<Re
 const READER_PERIOD: Duration = Duration::from_millis(2);
 
 /// Serves a QSB reader until its line is closed; what a full line does not take is lost.
-pub async fn reader(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<RefCell<SimulatedRig>>, which: usize) {
+pub async fn reader(mut line: impl AsyncRead + AsyncWrite + Unpin, rig: Rc<RefCell<SimulatedRig>>, which: usize) {
     let mut buffer = [0; 512];
     let mut bytes = Vec::new();
     loop {
@@ -127,9 +127,9 @@ pub async fn reader(mut line: impl AsyncRead + AsyncWrite + Unpin, world: Rc<Ref
             Err(_) => 0,
         };
         {
-            let mut world = world.borrow_mut();
-            world.advance();
-            world.exchange_with_reader(which, &buffer[..count], &mut bytes);
+            let mut rig = rig.borrow_mut();
+            rig.advance();
+            rig.exchange_with_reader(which, &buffer[..count], &mut bytes);
         }
         if timeout(BLOCKED, line.write_all(&bytes)).await.is_ok_and(|written| written.is_err()) {
             return;

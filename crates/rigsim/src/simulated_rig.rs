@@ -90,20 +90,20 @@ impl SimulatedRig {
     }
 
     /// Pulls a device's plug: its line hangs up and cannot be dialled, while the device itself goes on.
-    pub fn unplug(&mut self, part: DeviceKind) {
-        self.plugs[part as usize].out = true;
-        self.plugs[part as usize].told.send_replace(());
+    pub fn unplug(&mut self, kind: DeviceKind) {
+        self.plugs[kind as usize].out = true;
+        self.plugs[kind as usize].told.send_replace(());
     }
 
     /// Puts a device's plug in again.
-    pub fn replug(&mut self, part: DeviceKind) {
-        self.plugs[part as usize].out = false;
+    pub fn replug(&mut self, kind: DeviceKind) {
+        self.plugs[kind as usize].out = false;
     }
 
     /// Notice of the next time that a device's plug is pulled; `None` while it is out.
     #[must_use]
-    pub fn plug(&self, part: DeviceKind) -> Option<watch::Receiver<()>> {
-        let plug = &self.plugs[part as usize];
+    pub fn plug(&self, kind: DeviceKind) -> Option<watch::Receiver<()>> {
+        let plug = &self.plugs[kind as usize];
         (!plug.out).then(|| plug.told.subscribe())
     }
 
@@ -219,12 +219,12 @@ impl SimulatedRig {
     }
 
     /// Asks the servo drive.
-    pub fn ask_servo(&mut self, request: &Request) -> Reply {
+    pub fn answer_servo(&mut self, request: &Request) -> Reply {
         self.servo.handle(self.time_ns, request, &mut self.plant)
     }
 
     /// Asks the brake's current source.
-    pub fn ask_brake(&mut self, request: &Request) -> Reply {
+    pub fn answer_brake(&mut self, request: &Request) -> Reply {
         self.brake.handle(self.time_ns, request, &mut self.plant)
     }
 

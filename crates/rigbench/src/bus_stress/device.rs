@@ -1,4 +1,4 @@
-//! Devices of a trial: the emulators, with a plant that shows another number at each request, so that no stale value passes for a
+//! Devices of a stress test: the emulators, with a plant that shows another number at each request, so that no stale value passes for a
 //! fresh one.
 
 use std::time::Duration;
@@ -8,7 +8,7 @@ use tokio::time::{Instant, sleep_until, timeout};
 use wire::modbus::{Request, Response};
 use wire::rd60xx::Model;
 
-use super::Workload;
+use super::workload::Workload;
 use rigd::device::bus::Span;
 use rigd::link::Duplex;
 use rigsim::emulator::{BrakeCoil, BrakeEmulator, ModbusLine, Reply, ServoAxis, ServoEmulator};
@@ -17,7 +17,7 @@ use rigsim::emulator::{BrakeCoil, BrakeEmulator, ModbusLine, Reply, ServoAxis, S
 pub trait Device {
     /// Answers a request.
     fn handle(&mut self, now_ns: u64, request: &Request) -> Reply;
-    /// What a trial asks of it.
+    /// What a stress test asks of it.
     fn workload(&self) -> Workload;
 }
 
@@ -171,7 +171,7 @@ impl Device for Counting {
 }
 
 impl Counting {
-    /// What a trial asks of it, or of its twin.
+    /// What a stress test asks of it, or of its twin.
     pub const WORKLOAD: Workload = Workload {
         unit: 1,
         reads: &[(0, 2), (0, 2), (10, 4), (50, 1), (98, 4), (100, 2), (150, 8)],

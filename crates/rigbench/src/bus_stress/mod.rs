@@ -1,9 +1,10 @@
-//! A trial of a Modbus master on a line with faults: every value it returns is compared with what the device answered.
+//! A stress test of a Modbus master on a line with faults: every value it returns is compared with what the device answered.
 //!
 //! A value is *silently wrong* when the master returns it as good and the device gave no such answer to that question since the
 //! call began; a write is, when the master calls it done and the device did not confirm it. An error is not: it was told.
 
 mod device;
+mod workload;
 
 use std::cell::RefCell;
 use std::fmt::Write as _;
@@ -16,13 +17,14 @@ use serde::Serialize;
 use wire::modbus::{Request, Response};
 
 pub use device::{Brake, Counting, Device, Servo, serve};
+pub use workload::Workload;
 
 use super::proxy::{End, FaultPlan, Proxy, Record};
-use rigd::device::bus::{Bus, BusError, BusStatistics, Horizon, Manners, Span};
+use rigd::device::bus::{Bus, BusError, BusStatistics, Horizon, Manners};
 use rigd::link::{Address, Duplex, Link};
 
 /// What a master is asked to do.
-#[expect(async_fn_in_trait, reason = "trials run within one task")]
+#[expect(async_fn_in_trait, reason = "stress tests run within one task")]
 pub trait Master {
     /// Reads registers.
     async fn read(&mut self, first: u16, count: u16) -> Result<Vec<u16>, Told>;
@@ -57,19 +59,6 @@ impl Master for Bus {
 
 fn told(error: &BusError) -> Told {
     if matches!(error, BusError::HungUp { .. }) { Told::HungUp } else { Told::Failed }
-}
-
-/// Registers of a device that a trial reads and writes.
-#[derive(Debug, Clone)]
-pub struct Workload {
-    /// Unit of the device.
-    pub unit: u8,
-    /// Ranges that are read: first register and count.
-    pub reads: &'static [(u16, u16)],
-    /// Settings that are written: first register, count and largest value of the first word.
-    pub writes: &'static [(u16, u16, u16)],
-    /// What may be read as a whole.
-    pub spans: &'static [Span],
 }
 
 /// How the line is used, and how late its answers may be.
@@ -109,12 +98,12 @@ impl Timing {
     /// The project's own master on a link.
     #[must_use]
     pub fn master(&self, link: Link, work: &Workload) -> Bus {
-        let address = Address { device: "device", port: "trial".into(), baud: 115_200, format: "8N1".into() };
+        let address = Address { device: "device", port: "bench".into(), baud: 115_200, format: "8N1".into() };
         Bus::new(link, address, work.unit, self.manners).with_spans(work.spans).with_horizon(self.horizon)
     }
 }
 
-/// What came of a trial.
+/// What came of a stress test.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Tally {
     /// Reads and writes asked of the master.
@@ -168,7 +157,7 @@ impl Tally {
     }
 }
 
-/// Runs a trial until the master has sent so many requests. `connect` gives both ends of the master's side of the cable.
+/// Runs a stress test until the master has sent so many requests. `connect` gives both ends of the master's side of the cable.
 ///
 /// # Errors
 /// When the cable cannot be made.

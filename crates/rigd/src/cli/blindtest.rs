@@ -8,7 +8,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Exit, fail, print};
-use blindtest::case_score::{Outcome, judge};
+use blindtest::case_score::{CaseScore, score_case};
 use blindtest::family::Family;
 use blindtest::generate::Baselines;
 use blindtest::score::Score;
@@ -70,7 +70,7 @@ pub fn main(args: &Args) -> Exit {
     conclude(args, &score)
 }
 
-/// Makes, asks and judges every case, several at a time.
+/// Generates, diagnoses and scores every case, several at a time.
 fn go_through(args: &Args, plan: &SetPlan, directory: &Path, temporary: bool) -> Score {
     let cases = args.cases as usize;
     let jobs = args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), |n| n as usize);
@@ -79,7 +79,7 @@ fn go_through(args: &Args, plan: &SetPlan, directory: &Path, temporary: bool) ->
         progress.set_style(style);
     }
     let next = AtomicUsize::new(0);
-    let results: Mutex<Vec<(usize, Result<Outcome, String>)>> = Mutex::default();
+    let results: Mutex<Vec<(usize, Result<CaseScore, String>)>> = Mutex::default();
     std::thread::scope(|scope| {
         for _ in 0..jobs.min(cases) {
             scope.spawn(|| {
@@ -111,17 +111,17 @@ fn go_through(args: &Args, plan: &SetPlan, directory: &Path, temporary: bool) ->
     Score::of(outcomes, failed)
 }
 
-fn one(plan: &SetPlan, directory: &Path, number: usize) -> Result<Outcome, Box<dyn std::error::Error>> {
+fn one(plan: &SetPlan, directory: &Path, number: usize) -> Result<CaseScore, Box<dyn std::error::Error>> {
     let path = log::path(directory, number);
     if !path.exists() {
-        plan.make(directory, number)?;
+        plan.generate(directory, number)?;
     }
     // What the diagnosis shall do without is part of the question, not of the answer; nothing else of the label is used before it.
     let label = Sealed::open(directory, number, &log::sealed_hash(&path)?)?;
     let started = Instant::now();
     Ok(match query::diagnose(&path, &label.exclude) {
-        Ok(answer) => judge(&label, &answer, started.elapsed().as_secs_f64()),
-        Err(error) => Outcome::unanswered(&label, error.to_string()),
+        Ok(answer) => score_case(&label, &answer, started.elapsed().as_secs_f64()),
+        Err(error) => CaseScore::unanswered(&label, error.to_string()),
     })
 }
 

@@ -40,7 +40,7 @@ pub fn main(args: &Args, seed: u64, pair: Option<&std::path::Path>) -> Exit {
     let plan = SetPlan { seed, family: args.family, pair_toml, baselines: Baselines::default() };
     for number in 0..args.cases as usize {
         let started = Instant::now();
-        match plan.make(out, number) {
+        match plan.generate(out, number) {
             Ok(path) => print(&format!("{}  ({:.1} s)", path.display(), started.elapsed().as_secs_f64())),
             Err(error) => return fail(Exit::Failed, &error),
         }

@@ -1,10 +1,10 @@
 //! A Riden RD60xx that drives the brake's coil. Registers: [`wire::rd60xx`], `docs/wire/rd60xx.md`.
 
-use wire::modbus::{ExceptionCode, MAX_READ_COUNT, Request, Response};
+use wire::modbus::{ExceptionCode, MAX_READ_COUNT, Request};
 use wire::rd60xx::{Map, Model, Protection, address};
 use wire::register_map::RegisterDef;
 
-use super::{BrakeCoil, Reply, read_words};
+use super::interface::{BrakeCoil, Reply, echo_write, read_words};
 
 /// Registers of the device: 0 to the last preset.
 const REGISTERS: usize = 120;
@@ -102,15 +102,8 @@ impl BrakeEmulator {
                 let shown = self.shown(coil);
                 read_words(*address, *count, MAX_READ_COUNT, |at| shown.get(usize::from(at)).copied())
             }
-            Request::WriteSingle { address, value } => self
-                .write(*address, &[*value], coil)
-                .map_or_else(Response::Exception, |()| Response::WroteSingle { address: *address, value: *value }),
-            Request::WriteMultiple { address, values } => {
-                self.write(*address, values, coil).map_or_else(Response::Exception, |()| Response::WroteMultiple {
-                    address: *address,
-                    count: request.count(),
-                })
-            }
+            Request::WriteSingle { address, value } => echo_write(request, self.write(*address, &[*value], coil)),
+            Request::WriteMultiple { address, values } => echo_write(request, self.write(*address, values, coil)),
         };
         Reply::after(PROCESSING_NS, response)
     }
@@ -222,6 +215,7 @@ impl BrakeEmulator {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wire::modbus::Response;
 
     #[derive(Default)]
     struct Coil {

@@ -5,7 +5,7 @@ use wire::counter_box::{
     Samples, StreamDecoder,
 };
 
-use super::EncoderPair;
+use super::interface::EncoderPair;
 
 /// Fastest sampling, Hz.
 const MAX_SAMPLE_RATE_HZ: u32 = 200_000;

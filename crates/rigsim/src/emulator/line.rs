@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 
 use wire::modbus::{self, ExceptionCode, Incoming, Request, Response, ServerDecoder, ServerFrame, ServerStats};
 
-use super::Reply;
+use super::interface::Reply;
 
-/// What goes wrong with an answer. The request has been carried out, except with [`Fault::Exception`].
+/// What goes wrong with an answer. The request has been carried out, except with [`LineFault::Exception`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fault {
+pub enum LineFault {
     /// No answer.
     Silent,
     /// The answer comes so much later, ns.
@@ -51,8 +51,8 @@ pub struct Transmission {
 pub struct ModbusLine {
     decoder: ServerDecoder,
     frames: Vec<ServerFrame>,
-    next_faults: VecDeque<Option<Fault>>,
-    steady_fault: Option<Fault>,
+    next_faults: VecDeque<Option<LineFault>>,
+    steady_fault: Option<LineFault>,
 }
 
 impl ModbusLine {
@@ -67,12 +67,12 @@ impl ModbusLine {
     }
 
     /// The fault (or none) of the next answer that has no fault planned yet.
-    pub fn plan(&mut self, fault: Option<Fault>) {
+    pub fn plan(&mut self, fault: Option<LineFault>) {
         self.next_faults.push_back(fault);
     }
 
     /// The fault of all answers for which none is planned.
-    pub fn set_steady_fault(&mut self, fault: Option<Fault>) {
+    pub fn set_steady_fault(&mut self, fault: Option<LineFault>) {
         self.steady_fault = fault;
     }
 
@@ -104,7 +104,7 @@ impl ModbusLine {
             let fault = self.next_faults.pop_front().unwrap_or(self.steady_fault);
             let refusal = |code| Reply::after(REFUSAL_NS, Response::Exception(code));
             let reply = match (&frame.incoming, fault) {
-                (_, Some(Fault::Exception(code))) => refusal(code),
+                (_, Some(LineFault::Exception(code))) => refusal(code),
                 (Incoming::Refused { exception, .. }, _) => refusal(*exception),
                 (Incoming::Request(request), _) => handle(request),
             };
@@ -113,7 +113,7 @@ impl ModbusLine {
                 Incoming::Refused { function, .. } => (*function, None),
             };
             let answering_unit = match fault {
-                Some(Fault::WrongUnit(other)) => other,
+                Some(LineFault::WrongUnit(other)) => other,
                 _ => unit,
             };
             // Emulators answer no more than was asked and the decoder lets no more be asked than a frame carries, so this
@@ -137,36 +137,36 @@ const BROADCAST: u8 = 0;
 /// Sends an answer with its fault.
 fn transmit(
     sent: &mut Vec<Transmission>,
-    fault: Option<Fault>,
+    fault: Option<LineFault>,
     after_ns: u64,
     mut answer: Vec<u8>,
     echo: Option<Vec<u8>>,
 ) {
     let mut send = |after_ns, bytes| sent.push(Transmission { after_ns, bytes });
     match fault {
-        Some(Fault::Silent) => {}
-        Some(Fault::Late(late_ns)) => send(after_ns.saturating_add(late_ns), answer),
-        Some(Fault::Corrupt { byte, mask }) => {
+        Some(LineFault::Silent) => {}
+        Some(LineFault::Late(late_ns)) => send(after_ns.saturating_add(late_ns), answer),
+        Some(LineFault::Corrupt { byte, mask }) => {
             let place = byte % answer.len();
             answer[place] ^= mask;
             send(after_ns, answer);
         }
-        Some(Fault::Duplicate(later_ns)) => {
+        Some(LineFault::Duplicate(later_ns)) => {
             send(after_ns, answer.clone());
             send(after_ns.saturating_add(later_ns), answer);
         }
-        Some(Fault::Echo) => {
+        Some(LineFault::Echo) => {
             if let Some(echo) = echo {
                 send(0, echo);
             }
             send(after_ns, answer);
         }
-        Some(Fault::Split { after, gap_ns }) => {
+        Some(LineFault::Split { after, gap_ns }) => {
             let tail = answer.split_off(after % answer.len());
             send(after_ns, answer);
             send(after_ns.saturating_add(gap_ns), tail);
         }
-        None | Some(Fault::Exception(_) | Fault::WrongUnit(_)) => send(after_ns, answer),
+        None | Some(LineFault::Exception(_) | LineFault::WrongUnit(_)) => send(after_ns, answer),
     }
 }
 
@@ -213,8 +213,8 @@ mod tests {
     #[test]
     fn planned_faults_come_first_and_once() {
         let mut line = ModbusLine::new();
-        line.set_steady_fault(Some(Fault::Late(5)));
-        line.plan(Some(Fault::Silent));
+        line.set_steady_fault(Some(LineFault::Late(5)));
+        line.plan(Some(LineFault::Silent));
         line.plan(None);
         assert!(ask(&mut line, 1).is_empty());
         assert_eq!(ask(&mut line, 1)[0].after_ns, 1000);
@@ -224,10 +224,10 @@ mod tests {
     #[test]
     fn no_fault_yields_a_believable_wrong_answer() {
         let faults = [
-            Fault::Corrupt { byte: 4, mask: 1 },
-            Fault::WrongUnit(2),
-            Fault::Echo,
-            Fault::Exception(ExceptionCode::ServerDeviceBusy),
+            LineFault::Corrupt { byte: 4, mask: 1 },
+            LineFault::WrongUnit(2),
+            LineFault::Echo,
+            LineFault::Exception(ExceptionCode::ServerDeviceBusy),
         ];
         for fault in faults {
             let mut line = ModbusLine::new();
@@ -241,11 +241,11 @@ mod tests {
     #[test]
     fn splits_and_duplicates_keep_every_byte() {
         let mut line = ModbusLine::new();
-        line.plan(Some(Fault::Split { after: 3, gap_ns: 50 }));
+        line.plan(Some(LineFault::Split { after: 3, gap_ns: 50 }));
         let parts = ask(&mut line, 1);
         assert_eq!([parts[0].bytes.clone(), parts[1].bytes.clone()].concat(), good());
         assert_eq!((parts[0].after_ns, parts[1].after_ns), (1000, 1050));
-        line.plan(Some(Fault::Duplicate(7)));
+        line.plan(Some(LineFault::Duplicate(7)));
         let parts = ask(&mut line, 1);
         assert_eq!((&parts[0].bytes, &parts[1].bytes), (&good(), &good()));
     }

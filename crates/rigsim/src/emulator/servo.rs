@@ -5,10 +5,10 @@
 //! writes that are not kept to RAM.
 
 use wire::asda_b2::{self as drive, InputFunction, Outputs};
-use wire::modbus::{ExceptionCode, Request, Response};
+use wire::modbus::{ExceptionCode, Request};
 
+use super::interface::{Reply, ServoAxis, echo_write, read_words};
 use super::parameters::Parameters;
-use super::{Reply, ServoAxis, read_words};
 
 /// Time the drive takes to answer, before P3-07 is added, ns.
 const PROCESSING_NS: u64 = 1_000_000;
@@ -156,15 +156,8 @@ impl ServoEmulator {
             Request::ReadHolding { address, count } => {
                 read_words(*address, *count, drive::MAX_WORDS, |at| self.shown(at, axis))
             }
-            Request::WriteSingle { address, value } => self
-                .write(*address, &[*value], axis)
-                .map_or_else(Response::Exception, |()| Response::WroteSingle { address: *address, value: *value }),
-            Request::WriteMultiple { address, values } => {
-                self.write(*address, values, axis).map_or_else(Response::Exception, |()| Response::WroteMultiple {
-                    address: *address,
-                    count: request.count(),
-                })
-            }
+            Request::WriteSingle { address, value } => echo_write(request, self.write(*address, &[*value], axis)),
+            Request::WriteMultiple { address, values } => echo_write(request, self.write(*address, values, axis)),
         };
         let delay_ns = u64::from(self.word(drive::RESPONSE_DELAY.address)) * 1_000_000;
         Reply::after(PROCESSING_NS + delay_ns, response)
@@ -375,5 +368,4 @@ impl ServoEmulator {
 }
 
 #[cfg(test)]
-#[path = "servo_tests.rs"]
 mod tests;

@@ -12,23 +12,25 @@
 //! | servo drive | `servo` |
 //! | powder brake, its hysteresis, its stick-slip | `brake`, `hysteresis`, `stick_slip` |
 //! | encoders, counters, skew between them, a soft coupling | `encoder`, `skew`, `resonance` |
-//! | displacements of a reading that no known effect makes | `oddity` |
+//! | displacements of a reading that no known effect makes | `reading_error` |
 //! | bearings' run-out, slipping clamp, lost counts | `run_out`, `slippage` |
-//! | effects that the nominal model does not know | [`undocumented`] |
+//! | faults that the nominal model does not know | [`faults`] |
+//! | everything put together and advanced sample by sample | `assembly` |
 //!
 //! Same specification, seed and sequence of calls give the same samples, bit for bit.
 
+mod assembly;
 mod brake;
 mod chain;
 mod encoder;
 mod error;
+pub mod faults;
 mod flank;
 mod geometry;
 mod hysteresis;
 mod mesh;
-mod oddity;
+mod reading_error;
 mod resonance;
-mod rig;
 mod run_out;
 mod servo;
 mod skew;
@@ -39,17 +41,17 @@ mod table;
 mod teeth;
 #[cfg(test)]
 mod tests;
-pub mod undocumented;
 
+pub use assembly::{Plant, Sample, Truth};
 pub use brake::{BrakeCurvePoint, BrakeSpec, STICK_SLIP_LIMIT_RPM};
 pub use encoder::{CountLossSpec, EncoderSpec, EncodersSpec};
 pub use error::PlantError;
+pub use faults::{FAULTS, UNMODELLED_FAULTS};
 pub use flank::Flank;
 pub use geometry::GearSpec;
 pub use mesh::{BearingSpec, DEFAULT_MESH_COMPLIANCE_MM2_RAD_PER_NM, HousingSpec, MeshSpec};
-pub use oddity::{Carrier, Oddity, Weight};
+pub use reading_error::{Abscissa, ReadingError, Weight};
 pub use resonance::SoftCouplingSpec;
-pub use rig::{Plant, Sample, Truth};
 pub use run_out::NoiseSpec;
 pub use servo::DriveSpec;
 pub use slippage::ClampSpec;
@@ -57,4 +59,3 @@ pub use spec::{
     DEFAULT_SHAFT_COMPLIANCE_INPUT_RAD_PER_NM, DEFAULT_SHAFT_COMPLIANCE_OUTPUT_RAD_PER_NM, PlantSpec, ShaftSpec,
 };
 pub use teeth::{DamageSpec, ProfileOrder, ToothSpec};
-pub use undocumented::{OUTSIDE, UNDOCUMENTED};

@@ -5,7 +5,7 @@ use super::encoder::EncodersSpec;
 use super::error::{PlantError, in_range};
 use super::geometry::GearSpec;
 use super::mesh::{BearingSpec, HousingSpec, MeshSpec};
-use super::oddity::Oddity;
+use super::reading_error::ReadingError;
 use super::run_out::NoiseSpec;
 use super::servo::DriveSpec;
 use super::slippage::ClampSpec;
@@ -137,7 +137,7 @@ pub struct PlantSpec {
     /// Housing that may grow.
     pub housing: HousingSpec,
     /// Displacements of the output's reading that no known effect makes.
-    pub oddities: Vec<Oddity>,
+    pub reading_errors: Vec<ReadingError>,
 }
 
 impl PlantSpec {
@@ -162,7 +162,7 @@ impl PlantSpec {
         self.mesh.validate()?;
         self.teeth.validate(&self.gears, self.mesh.compliance_mm2_rad_per_nm)?;
         self.bearings.validate()?;
-        self.oddities.iter().try_for_each(Oddity::validate)?;
+        self.reading_errors.iter().try_for_each(ReadingError::validate)?;
         self.drive.validate()?;
         self.shafts.validate()?;
         self.brake.validate()?;

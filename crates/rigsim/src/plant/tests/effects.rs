@@ -1,4 +1,4 @@
-//! What each undocumented effect leaves in the measurement, to first order and in sign.
+//! What each fault leaves in the measurement, to first order and in sign.
 
 use super::*;
 use std::f64::consts::TAU;
@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 /// A quiet rig with the effect `name`.
 pub(super) fn with(name: &str) -> PlantSpec {
     let mut spec = PlantSpec::default().quiet();
-    undocumented::find(name).unwrap().apply_usual(&mut spec);
+    faults::find(name).unwrap().apply_usual(&mut spec);
     spec
 }
 
