@@ -12,6 +12,11 @@ test:
 lint:
     cargo fmt --all --check
     cargo clippy --release --workspace --all-targets -- -D warnings
+    scripts/wrap_docs.py --check
+
+# Wraps the documents at 120 columns.
+wrap:
+    scripts/wrap_docs.py
 
 # Speed of the main job, the replay and the codecs, as ratios to real time.
 bench:
