@@ -13,6 +13,12 @@ lint:
     cargo fmt --all --check
     cargo clippy --release --workspace --all-targets -- -D warnings
     scripts/wrap_docs.py --check
+    scripts/structure.py --check
+
+# What the crates may use of each other, circles of files, long functions; brings the figures of ARCHITECTURE.md up to date.
+structure:
+    scripts/structure.py
+    scripts/structure.py --write
 
 # Wraps the documents at 120 columns.
 wrap:
