@@ -20,6 +20,10 @@ structure:
     scripts/structure.py
     scripts/structure.py --write
 
+# Makes the sample outputs in the documents anew, of the release build (what is a sample, scripts/samples.py says).
+samples:
+    .venv/bin/python scripts/samples.py
+
 # Wraps the documents at 120 columns.
 wrap:
     scripts/wrap_docs.py
@@ -47,12 +51,12 @@ bench-cpu:
 
 # A million Modbus transactions a device with faults in simulated time; no value may be silently wrong.
 modbus-faults TRANSACTIONS="1000000":
-    cargo build --release -p rigd --example modbus_faults
+    cargo build --release -p rigbench --example modbus_faults
     for device in servo brake table; do target/release/examples/modbus_faults --device $device --transactions {{TRANSACTIONS}} || exit 1; done
 
 # The same over pseudo-terminals in real time, and against pymodbus's server (a quarter of an hour).
 modbus-faults-pty TRANSACTIONS="10000":
-    cargo build --release -p rigd --example modbus_faults
+    cargo build --release -p rigbench --example modbus_faults
     for device in servo brake; do target/release/examples/modbus_faults --device $device --over pty --transactions {{TRANSACTIONS}} || exit 1; done
     target/release/examples/modbus_faults --device pymodbus --transactions {{TRANSACTIONS}}
 
