@@ -20,6 +20,10 @@ structure:
     scripts/structure.py
     scripts/structure.py --write
 
+# Compiles the log's message definitions anew, after a change of crates/riglog/proto.
+proto:
+    cargo run --package riglog --features compile-proto --example compile_proto
+
 # Makes the sample outputs in the documents anew, of the release build (what is a sample, scripts/samples.py says).
 samples:
     .venv/bin/python scripts/samples.py
