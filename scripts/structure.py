@@ -346,7 +346,8 @@ def files_naming_effects(root: Path, texts: dict[Path, str]) -> dict[str, int]:
     library = Path("crates/gearmodel/src/effect/mod.rs")
     names = re.findall(r"\bmod (\w+_\w+);", texts.get(library, ""))
     quoted = {name for name in names if any(f'"{name}"' in text for file, text in texts.items() if file.parent == library.parent)}
-    return {name: sum(bool(re.search(rf"\b{name}\b", text)) for text in texts.values()) for name in quoted}
+    words = [set(re.findall(r"\w+", text)) for text in texts.values()]
+    return {name: sum(name in words_of_file for words_of_file in words) for name in quoted}
 
 
 def figures(root, sources, walls, circles, functions, crate_lines, file_lines) -> list[tuple[str, str]]:

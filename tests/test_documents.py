@@ -29,6 +29,8 @@ def git_files():
 
 FILES = git_files()
 DOCUMENTS = [name for name in FILES if name.endswith(".md") and "fixtures" not in pathlib.Path(name).parts]
+# What once was is not held against what is.
+PRESENT = [name for name in DOCUMENTS if name != "CHANGELOG.md"]
 FENCE = re.compile(r"^ *```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 
 
@@ -70,7 +72,7 @@ FOREIGN = re.compile(
 )
 
 
-@pytest.mark.parametrize("document", DOCUMENTS)
+@pytest.mark.parametrize("document", PRESENT)
 def test_paths_in_code_spans_exist(document):
     """As a path from the root or the document, or the end of one that git knows; `*` and `<name>` stand for anything."""
     missing = []
@@ -94,7 +96,7 @@ def crate(name):
 CRATES = [path.parts[1] for path in map(pathlib.Path, FILES) if path.parts[0] == "crates" and path.parts[2:] == ("src", "lib.rs")]
 
 
-@pytest.mark.parametrize("document", DOCUMENTS)
+@pytest.mark.parametrize("document", PRESENT)
 def test_rust_names_exist(document):
     """`crate::module::Name` is a module or an item; what comes after an item (a method, a variant) is not looked up."""
     missing = []
