@@ -320,7 +320,7 @@ def survey(root: Path) -> House:
     circles, functions, sources, crate_lines, file_lines = [], [], {}, {}, {}
     for package in packages:
         folder = Path(package["manifest_path"]).parent
-        files = [file for file in sorted(folder.rglob("*.rs")) if "target" not in file.relative_to(folder).parts]
+        files = [file for file in sorted(folder.rglob("*.rs")) if not {"target", "generated"} & set(file.relative_to(folder).parts)]
         for file in files:
             file_lines[file.relative_to(root)] = lines_of(file)
         crate_lines[package["name"]] = sum(lines_of(file) for file in files)
