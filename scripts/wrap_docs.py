@@ -3,12 +3,12 @@
 
 Paragraphs and list items are filled anew; headings, tables, code, HTML and quotations stay as they are. What is rendered
 does not change: code spans are never broken, and no line begins with what would be taken for markup there. Without FILE
-it takes every document of the repository that git knows, fixtures left out. --check writes nothing, and exits with 1
+it takes every document of the repository, fixtures left out. --check writes nothing, and exits with 1
 where a document is not as it would be written.
 """
 
+import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -96,10 +96,12 @@ def wrap(document: str) -> str:
 
 
 def documents() -> list[Path]:
-    """Every document that git knows, fixtures left out."""
-    root = Path(__file__).resolve().parent.parent
-    names = subprocess.run(["git", "ls-files", "*.md"], cwd=root, capture_output=True, text=True, check=True).stdout
-    return [root / name for name in names.splitlines() if "fixtures" not in Path(name).parts]
+    """Every document of the repository, fixtures left out."""
+    found = []
+    for folder, folders, files in os.walk(Path(__file__).resolve().parent.parent):
+        folders[:] = [name for name in folders if name not in ("target", "fixtures", "runs") and not name.startswith(".")]
+        found += [Path(folder, name) for name in files if name.endswith(".md")]
+    return sorted(found)
 
 
 def main() -> int:
