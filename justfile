@@ -12,6 +12,25 @@ test:
 lint:
     cargo fmt --all --check
     cargo clippy --release --workspace --all-targets -- -D warnings
+    scripts/wrap_docs.py --check
+    scripts/structure.py --check
+
+# What the crates may use of each other, circles of files, long functions; brings the figures of ARCHITECTURE.md up to date.
+structure:
+    scripts/structure.py
+    scripts/structure.py --write
+
+# Compiles the log's message definitions anew, after a change of crates/riglog/proto.
+proto:
+    cargo run --package riglog --features compile-proto --example compile_proto
+
+# Makes the sample outputs in the documents anew, of the release build (what is a sample, scripts/samples.py says).
+samples:
+    .venv/bin/python scripts/samples.py
+
+# Wraps the documents at 120 columns.
+wrap:
+    scripts/wrap_docs.py
 
 # Speed of the main job, the replay and the codecs, as ratios to real time.
 bench:
@@ -36,12 +55,12 @@ bench-cpu:
 
 # A million Modbus transactions a device with faults in simulated time; no value may be silently wrong.
 modbus-faults TRANSACTIONS="1000000":
-    cargo build --release -p rigd --example modbus_faults
+    cargo build --release -p rigbench --example modbus_faults
     for device in servo brake table; do target/release/examples/modbus_faults --device $device --transactions {{TRANSACTIONS}} || exit 1; done
 
 # The same over pseudo-terminals in real time, and against pymodbus's server (a quarter of an hour).
 modbus-faults-pty TRANSACTIONS="10000":
-    cargo build --release -p rigd --example modbus_faults
+    cargo build --release -p rigbench --example modbus_faults
     for device in servo brake; do target/release/examples/modbus_faults --device $device --over pty --transactions {{TRANSACTIONS}} || exit 1; done
     target/release/examples/modbus_faults --device pymodbus --transactions {{TRANSACTIONS}}
 

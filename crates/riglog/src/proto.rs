@@ -1,21 +1,21 @@
-//! The messages of the rig log, generated from `proto/rig.proto` and `proto/foxglove/Log.proto`.
+//! The messages of the rig log, generated from `proto/rig.proto` and `proto/foxglove/Log.proto` by `just proto`.
 
 /// Text lines as every MCAP viewer knows them.
 #[allow(missing_docs, clippy::all, clippy::pedantic, unused_qualifications)]
 pub mod foxglove {
-    include!(concat!(env!("OUT_DIR"), "/foxglove.rs"));
+    include!("../proto/generated/foxglove.rs");
 }
 
 #[allow(missing_docs, clippy::all, clippy::pedantic, unused_qualifications)]
 mod rig {
-    include!(concat!(env!("OUT_DIR"), "/rig.rs"));
+    include!("../proto/generated/rig.rs");
 }
 
 // The generated modules refer to each other by `super::google::protobuf`.
 #[allow(missing_docs, clippy::all, clippy::pedantic, unused_qualifications, dead_code)]
 mod google {
     pub mod protobuf {
-        include!(concat!(env!("OUT_DIR"), "/google.protobuf.rs"));
+        include!("../proto/generated/google.protobuf.rs");
     }
 }
 

@@ -16,9 +16,9 @@ pub enum Topic {
 }
 
 /// Schema of the messages of package `rig`, with everything that it imports.
-const RIG_DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/rig.fds"));
+const RIG_DESCRIPTORS: &[u8] = include_bytes!("../proto/generated/rig.fds");
 /// Schema of `foxglove.Log`, with everything that it imports.
-const LOG_DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/foxglove_log.fds"));
+const LOG_DESCRIPTORS: &[u8] = include_bytes!("../proto/generated/foxglove_log.fds");
 
 /// Encoding of messages and schemas, as the MCAP registry names it.
 pub(crate) const ENCODING: &str = "protobuf";

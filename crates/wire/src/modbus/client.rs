@@ -1,7 +1,7 @@
 //! The client's side: exactly one answer to exactly one request, checked in every field that it has.
 
-use super::error::ResponseError;
 use super::pdu::{ExceptionCode, Request, Response};
+use super::response_error::ResponseError;
 use super::{function, split_crc, words};
 use crate::Hex;
 

@@ -9,14 +9,16 @@
 //! reads back what it writes.
 
 mod client;
-mod error;
+mod encode_error;
 mod pdu;
+mod response_error;
 mod server;
 mod timing;
 
 pub use client::ClientDecoder;
-pub use error::{EncodeError, ResponseError};
+pub use encode_error::EncodeError;
 pub use pdu::{ExceptionCode, MAX_READ_COUNT, MAX_WRITE_COUNT, Request, Response, encode_request, encode_response};
+pub use response_error::ResponseError;
 pub use server::{Incoming, ServerDecoder, ServerFrame, ServerStats};
 pub use timing::{LineSettings, Parity, frame_time, inter_character_timeout, inter_frame_silence};
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::error::EncodeError;
+use super::encode_error::EncodeError;
 use super::{function, push_crc};
 
 /// Registers one read may ask for (V1.1b3 §6.3). Devices may allow fewer.
