@@ -21,7 +21,7 @@ const ZERO_RAD2: f64 = 1.0;
 /// Columns that are refitted, with their prior variances.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
-    /// Columns of the pool, the zero not among them.
+    /// Columns of the design matrix, the zero not among them.
     pub columns: Vec<usize>,
     /// Their prior variances, rad².
     pub prior_rad2: Vec<f64>,
@@ -57,13 +57,13 @@ impl Errors {
 }
 
 impl HeldOut {
-    /// Sums for these columns of the pool. Units are runs, or revolutions where there is one run.
+    /// Sums for these columns of the design matrix. Units are runs, or revolutions where there is one run.
     #[must_use]
-    pub fn new(grid: &Grid, pool: &DesignMatrix, noise: &Noise, columns: &[usize]) -> Self {
+    pub fn new(grid: &Grid, design: &DesignMatrix, noise: &Noise, columns: &[usize]) -> Self {
         let mut all = vec![RESIDUAL, ZERO];
         all.extend(columns.iter().copied().filter(|c| *c != ZERO && *c != RESIDUAL));
         all.dedup();
-        let values: Vec<Vec<f64>> = all.par_iter().map(|c| pool.column(grid, *c)).collect();
+        let values: Vec<Vec<f64>> = all.par_iter().map(|c| design.column(grid, *c)).collect();
         let by_run = grid.plan.runs > 1;
         let units = if by_run { grid.directions.len() } else { grid.revolutions.len() };
         let p = all.len();
@@ -83,7 +83,7 @@ impl HeldOut {
             vec![(DMatrix::zeros(WAVES, WAVES), DMatrix::zeros(WAVES, p)); units];
         for (number, (revolution, square)) in grid.revolutions.iter().zip(&squares).enumerate() {
             let unit = if by_run { revolution.run } else { number };
-            let c = pool.waves[number].select_columns(&all) * precision;
+            let c = design.waves[number].select_columns(&all) * precision;
             if let Some(passing) = noise.revolution(number) {
                 let lost = &passing.half * &c;
                 grams[unit] += square * precision - lost.transpose() * &lost;

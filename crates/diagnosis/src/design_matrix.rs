@@ -16,7 +16,7 @@ use super::nuisance_patterns::Pattern;
 use super::waves::{WAVES, waves};
 use gearmodel::effect::{Effect, Grain, OperatingPoint, Rig, Rows, Shape};
 
-/// Column of the residual and of the zero in the pool.
+/// Column of the residual and of the zero in the design matrix.
 pub(super) const RESIDUAL: usize = 0;
 pub(super) const ZERO: usize = 1;
 /// Blocks wider than this are scanned on a coarser grid of scales: 2, 8, 32, 128 µrad.
@@ -60,8 +60,8 @@ impl Candidate {
     /// True where beside one of them the other explains nothing: steps at times of one's choice follow any random walk.
     #[must_use]
     pub fn excludes(&self, other: &Self) -> bool {
-        let walks = |cause: &Self| matches!(cause, Self::Unknown(Pattern::RandomWalk { .. }));
-        let steps = |cause: &Self| match cause {
+        let walks = |candidate: &Self| matches!(candidate, Self::Unknown(Pattern::RandomWalk { .. }));
+        let steps = |candidate: &Self| match candidate {
             Self::Effect { effect, .. } => effect.steps(),
             Self::Unknown(pattern) => matches!(pattern, Pattern::Step { .. }),
         };
@@ -80,14 +80,14 @@ impl Candidate {
     }
 }
 
-/// A block of unit-RMS columns in the pool.
+/// A block of unit-RMS columns in the design matrix.
 #[derive(Clone)]
 pub struct Block {
     /// What it stands for.
-    pub cause: Candidate,
-    /// Its columns in the pool.
+    pub candidate: Candidate,
+    /// Its columns in the design matrix.
     pub columns: std::ops::Range<usize>,
-    /// Raw amplitudes = `transform` · amplitudes in the pool.
+    /// Raw amplitudes = `transform` · amplitudes in the design matrix.
     pub transform: DMatrix<f64>,
 }
 
@@ -112,7 +112,7 @@ pub struct DesignMatrix {
     base: Arc<Base>,
 }
 
-/// What pools over one grid share.
+/// What design matrices over one grid share.
 struct Base {
     /// Sums of the weights over each cell.
     cell_weight: Vec<f64>,
@@ -145,27 +145,27 @@ impl Base {
     }
 }
 
-/// Rows of a cause at points_of_operation.
-fn rows(cause: &Candidate, rig: &Rig, points_of_operation: &[OperatingPoint], width: usize) -> DMatrix<f64> {
-    let mut raw = DMatrix::zeros(points_of_operation.len(), width);
+/// Rows of a candidate at operating points.
+fn rows(candidate: &Candidate, rig: &Rig, operating_points: &[OperatingPoint], width: usize) -> DMatrix<f64> {
+    let mut raw = DMatrix::zeros(operating_points.len(), width);
     let (mut row, mut part) = (vec![0.0; width], vec![0.0; width]);
-    let grain = match cause {
+    let grain = match candidate {
         Candidate::Effect { effect, shape, .. } => effect.grain(shape),
         Candidate::Unknown(_) => Grain::Smooth,
     };
     let places = grain.places();
-    let mut take: Rows<'_> = match cause {
+    let mut take: Rows<'_> = match candidate {
         Candidate::Effect { effect, shape, .. } => effect.rows(rig, shape),
-        Candidate::Unknown(pattern) => Box::new(|station, row| pattern.row(station, row)),
+        Candidate::Unknown(pattern) => Box::new(|at, row| pattern.row(at, row)),
     };
-    for (number, station) in points_of_operation.iter().enumerate() {
+    for (number, at) in operating_points.iter().enumerate() {
         row.fill(0.0);
         if grain == Grain::Smooth {
-            take(station, &mut row);
+            take(at, &mut row);
         } else {
-            let mut near = *station;
+            let mut near = *at;
             for place in places {
-                near.move_from(station, place * station.spread_rad);
+                near.move_from(at, place * at.spread_rad);
                 part.fill(0.0);
                 take(&near, &mut part);
                 row.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x / places.len() as f64);
@@ -203,20 +203,20 @@ impl DesignMatrix {
     /// The residual and the zero, without blocks.
     #[must_use]
     pub fn new(grid: &Grid) -> Self {
-        let mut pool = Self {
+        let mut design = Self {
             blocks: Vec::new(),
             columns: Columns::default(),
             products: DMatrix::zeros(0, 0),
             waves: vec![DMatrix::zeros(WAVES, 0); grid.revolutions.len()],
             base: Arc::new(Base::new(grid)),
         };
-        pool.columns.push(grid, Values::Places(grid.rho_rad.clone()));
-        pool.columns.push(grid, Values::Cells(vec![1.0; grid.cells.len()]));
-        pool.grow_sums(grid);
-        pool
+        design.columns.push(grid, Values::Places(grid.rho_rad.clone()));
+        design.columns.push(grid, Values::Cells(vec![1.0; grid.cells.len()]));
+        design.grow_sums(grid);
+        design
     }
 
-    /// A pool of some of the blocks, in their order, for trials: it stays small.
+    /// A design matrix of some of the blocks, in their order, for trials: it stays small.
     #[must_use]
     pub fn only(&self, grid: &Grid, blocks: &[usize]) -> Self {
         let mut columns = vec![RESIDUAL, ZERO];
@@ -261,37 +261,38 @@ impl DesignMatrix {
     }
 
     /// Adds blocks; those that the plan cannot see are left out. Returns the numbers of those added.
-    pub fn add(&mut self, grid: &Grid, rig: &Rig, causes: &[Candidate]) -> Vec<usize> {
+    pub fn add(&mut self, grid: &Grid, rig: &Rig, candidates: &[Candidate]) -> Vec<usize> {
         let mut numbers = Vec::new();
-        let (evolving, others): (Vec<_>, Vec<_>) = causes.iter().partition(|cause| cause.evolves());
-        let width = |causes: &[&Candidate]| causes.iter().map(|cause| cause.width(rig)).sum();
+        let (evolving, others): (Vec<_>, Vec<_>) = candidates.iter().partition(|candidate| candidate.evolves());
+        let width = |candidates: &[&Candidate]| candidates.iter().map(|candidate| candidate.width(rig)).sum();
         self.columns.reserve(grid, width(&others), width(&evolving));
         // Not all at once: before a column stands among the others it takes up memory twice.
-        for batch in causes.chunks(BATCH) {
-            let made: Vec<_> = batch.par_iter().map(|cause| self.unit_columns(grid, rig, cause)).collect();
-            for (cause, (values, transform)) in batch.iter().zip(made).filter_map(|(cause, made)| Some((cause, made?)))
+        for batch in candidates.chunks(BATCH) {
+            let made: Vec<_> = batch.par_iter().map(|candidate| self.unit_columns(grid, rig, candidate)).collect();
+            for (candidate, (values, transform)) in
+                batch.iter().zip(made).filter_map(|(candidate, made)| Some((candidate, made?)))
             {
                 let first = self.width();
                 values.into_iter().for_each(|values| self.columns.push(grid, values));
                 numbers.push(self.blocks.len());
-                self.blocks.push(Block { cause: cause.clone(), columns: first..self.width(), transform });
+                self.blocks.push(Block { candidate: candidate.clone(), columns: first..self.width(), transform });
             }
         }
         self.grow_sums(grid);
         numbers
     }
 
-    fn unit_columns(&self, grid: &Grid, rig: &Rig, cause: &Candidate) -> Option<(Vec<Values>, DMatrix<f64>)> {
-        let (width, evolves) = (cause.width(rig), cause.evolves());
-        let (points_of_operation, weights) =
+    fn unit_columns(&self, grid: &Grid, rig: &Rig, candidate: &Candidate) -> Option<(Vec<Values>, DMatrix<f64>)> {
+        let (width, evolves) = (candidate.width(rig), candidate.evolves());
+        let (operating_points, weights) =
             if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.base.cell_weight) };
-        let growing = match cause {
+        let growing = match candidate {
             Candidate::Unknown(pattern) => pattern.growing(),
             Candidate::Effect { .. } => None,
         };
         let raw = match growing {
             Some((steady, mean_s)) => grown(grid, &rows(&Candidate::Unknown(steady), rig, &grid.cells, width), mean_s),
-            None => rows(cause, rig, points_of_operation, width),
+            None => rows(candidate, rig, operating_points, width),
         };
         let total: f64 = weights.iter().sum();
         // A constant is the zero's; what is left of a column is its trace.
@@ -306,7 +307,7 @@ impl DesignMatrix {
         if scale.max() < 1e-9 * size {
             return None;
         }
-        if matches!(cause, Candidate::Unknown(pattern) if pattern.keeps_sizes()) {
+        if matches!(candidate, Candidate::Unknown(pattern) if pattern.keeps_sizes()) {
             let transform = DMatrix::identity(width, width) * (width as f64 / covariance.trace()).sqrt();
             return Some(values(&(raw * transform[(0, 0)]), evolves, transform));
         }

@@ -13,7 +13,7 @@ use super::nuisance_patterns::Pattern;
 use super::posterior::{self, Posterior, confusable};
 use super::reduce::{ReducedRun, Reducer, Sample};
 use super::search::{Allowed, Model, Search};
-use super::transients::Knocks;
+use super::transients::Transients;
 use super::{
     cross_validation, events, evidence, experiment_design, ghosts, interpolation, localisation, sectors, slow_tone,
     transients,
@@ -65,7 +65,7 @@ pub enum GapError {
     TooShort {
         /// Recordings given.
         recordings: usize,
-        /// Stretches found.
+        /// Segments found.
         points: usize,
         /// Least number.
         needed: usize,
@@ -189,12 +189,12 @@ pub fn diagnose_runs(
     }
     let found_lines = take_off_lines(&mut runs, lines.as_ref(), options);
     let mut grid = Grid::new(nominal.rig(), &runs);
-    let knocks = transients::take_off(&grid, &mut runs);
-    if knocks.is_some() {
+    let transients = transients::take_off(&grid, &mut runs);
+    if transients.is_some() {
         grid = Grid::new(nominal.rig(), &runs);
     }
     let (tones, grid) = events::take_off_tones(nominal.rig(), &mut runs, grid);
-    let mut engine = Engine::new(nominal.rig(), grid, Aside { tones, knocks }, options);
+    let mut engine = Engine::new(nominal.rig(), grid, Aside { tones, transients }, options);
     engine.solve();
     engine.report(&found_lines).ok_or(GapError::Singular)
 }
@@ -268,7 +268,7 @@ fn join(mut runs: Vec<ReducedRun>) -> Vec<ReducedRun> {
 /// What was taken off the points before anything was fitted.
 struct Aside {
     tones: Vec<Tone>,
-    knocks: Option<Knocks>,
+    transients: Option<Transients>,
 }
 
 impl Aside {
@@ -279,16 +279,16 @@ impl Aside {
 
     /// Its mean square, rad².
     fn mean_square_rad2(&self) -> f64 {
-        self.tones_rad2() + self.knocks.map_or(0.0, |knocks| knocks.mean_square_rad2)
+        self.tones_rad2() + self.transients.map_or(0.0, |transients| transients.mean_square_rad2)
     }
 
     /// RMS below which nothing is told from the tails of the knocks, rad.
     fn least_rad(&self) -> f64 {
-        self.knocks.map_or(0.0, |knocks| TAILS * knocks.mean_square_rad2.sqrt())
+        self.transients.map_or(0.0, |transients| TAILS * transients.mean_square_rad2.sqrt())
     }
 
     fn is_empty(&self) -> bool {
-        self.tones.is_empty() && self.knocks.is_none()
+        self.tones.is_empty() && self.transients.is_none()
     }
 }
 
@@ -297,7 +297,7 @@ struct Engine<'a> {
     rig: &'a Rig,
     aside: Aside,
     grid: Grid,
-    pool: DesignMatrix,
+    design: DesignMatrix,
     options: &'a Options,
     noise: Noise,
     whitened: Whitened,
@@ -309,8 +309,8 @@ struct Engine<'a> {
 
 impl<'a> Engine<'a> {
     fn new(rig: &'a Rig, grid: Grid, aside: Aside, options: &'a Options) -> Self {
-        let mut pool = DesignMatrix::new(&grid);
-        let mut causes = Vec::new();
+        let mut design = DesignMatrix::new(&grid);
+        let mut candidates = Vec::new();
         for (number, effect) in LIBRARY.iter().copied().enumerate() {
             if !effect.applies(rig) || options.exclude.iter().any(|name| name == effect.name()) {
                 continue;
@@ -318,15 +318,15 @@ impl<'a> Engine<'a> {
             let shapes = effect.shapes(rig, &grid.plan);
             // Neighbouring shapes are alike: they count as fewer.
             let cost_nats = 0.8 * (shapes.len().max(1) as f64).ln();
-            causes.extend(shapes.into_iter().map(|shape| Candidate::Effect { effect, number, shape, cost_nats }));
+            candidates.extend(shapes.into_iter().map(|shape| Candidate::Effect { effect, number, shape, cost_nats }));
         }
-        causes.extend(Pattern::all(&grid.plan).into_iter().map(Candidate::Unknown));
-        pool.add(&grid, rig, &causes);
-        let noise = Noise::estimate(&grid, &pool, &[]);
+        candidates.extend(Pattern::all(&grid.plan).into_iter().map(Candidate::Unknown));
+        design.add(&grid, rig, &candidates);
+        let noise = Noise::estimate(&grid, &design, &[]);
         let ghosts = ghosts::find(&grid, &noise, &grid.rho_rad);
-        pool.add(&grid, rig, &ghosts.into_iter().map(Candidate::Unknown).collect::<Vec<_>>());
+        design.add(&grid, rig, &ghosts.into_iter().map(Candidate::Unknown).collect::<Vec<_>>());
         let whitened = Whitened::empty();
-        Self { rig, aside, grid, pool, options, noise, whitened, best: None, models: Vec::new(), large: None }
+        Self { rig, aside, grid, design, options, noise, whitened, best: None, models: Vec::new(), large: None }
     }
 
     /// Search, look for events, sharpen, estimate the noise anew, until nothing changes.
@@ -350,10 +350,10 @@ impl<'a> Engine<'a> {
     fn estimate_noise(&mut self) {
         let amplitudes = self.best.as_ref().map(|m| m.fit.amplitudes()).unwrap_or_default();
         let ratio = self.noise.run_ratio;
-        self.noise = Noise::estimate(&self.grid, &self.pool, &amplitudes);
+        self.noise = Noise::estimate(&self.grid, &self.design, &amplitudes);
         self.noise.run_ratio = ratio;
         if let Some(best) = &self.best {
-            self.noise.run_ratio = self.best_run_ratio(&self.noise, &self.pool, &best.fit);
+            self.noise.run_ratio = self.best_run_ratio(&self.noise, &self.design, &best.fit);
         }
     }
 
@@ -361,8 +361,8 @@ impl<'a> Engine<'a> {
     fn search(&mut self, last: bool) {
         let starts: Vec<Vec<usize>> =
             self.best.as_ref().map(|m| m.fit.set.clone()).into_iter().chain(self.large.take()).collect();
-        self.whitened = self.noise.whiten(&self.grid, &self.pool);
-        let mut search = self.search_in(&self.pool, &self.whitened);
+        self.whitened = self.noise.whiten(&self.grid, &self.design);
+        let mut search = self.search_in(&self.design, &self.whitened);
         let mut best = search.run();
         for set in starts {
             if let Some(other) = search.climb(set, Allowed::All)
@@ -381,20 +381,20 @@ impl<'a> Engine<'a> {
         self.best = best;
     }
 
-    /// A search in a pool under one noise, with what is known and what was cut out.
-    fn search_in<'b>(&self, pool: &'b DesignMatrix, whitened: &'b Whitened) -> Search<'b> {
-        Search::new(pool, whitened, &self.options.known, self.aside.least_rad())
+    /// A search in a design matrix under one noise, with what is known and what was cut out.
+    fn search_in<'b>(&self, design: &'b DesignMatrix, whitened: &'b Whitened) -> Search<'b> {
+        Search::new(design, whitened, &self.options.known, self.aside.least_rad())
     }
 
     /// The scatter between runs that a fit leaves, weighed on a grid.
-    fn best_run_ratio(&self, noise: &Noise, pool: &DesignMatrix, fit: &evidence::Fit) -> [f64; 2] {
+    fn best_run_ratio(&self, noise: &Noise, design: &DesignMatrix, fit: &evidence::Fit) -> [f64; 2] {
         if self.grid.plan.runs < 2 {
             return noise.run_ratio;
         }
         let mut columns = vec![super::design_matrix::RESIDUAL];
         columns.extend(&fit.columns);
         let mut chosen = (f64::NEG_INFINITY, noise.run_ratio);
-        let within = noise.within_runs(&self.grid, pool, Some(&columns));
+        let within = noise.within_runs(&self.grid, design, Some(&columns));
         for level in RUN_RATIOS {
             for waves in RUN_RATIOS {
                 let ratio = [level, waves];
@@ -404,7 +404,7 @@ impl<'a> Engine<'a> {
                     .zip(FIRST_RUN_RATIO)
                     .map(|(ratio, usual)| -0.5 * ((ratio / usual).ln() / RUN_RATIO_SPREAD).powi(2))
                     .sum();
-                let score = evidence::at_scales(pool, &whitened, fit) + log_prior;
+                let score = evidence::at_scales(design, &whitened, fit) + log_prior;
                 if score > chosen.0 {
                     chosen = (score, ratio);
                 }
@@ -414,16 +414,16 @@ impl<'a> Engine<'a> {
     }
 
     /// Moves the shapes of the best model's larger effects to where they fit best, the small ones left out: what a shape on
-    /// a grid misses must not be made up by other effects. Then both sets compete. Works in a pool of its own, which stays
+    /// a grid misses must not be made up by other effects. Then both sets compete. Works in a design matrix of its own, which stays
     /// small.
     fn sharpen(&mut self) -> bool {
         let Some(best) = &self.best else { return false };
-        let largest = (0..best.fit.set.len()).map(|n| best.fit.rms_rad(&self.pool, n)).fold(0.0, f64::max);
+        let largest = (0..best.fit.set.len()).map(|n| best.fit.rms_rad(&self.design, n)).fold(0.0, f64::max);
         let large: Vec<usize> = (0..best.fit.set.len())
-            .filter(|n| best.fit.rms_rad(&self.pool, *n) > LARGE * largest)
+            .filter(|n| best.fit.rms_rad(&self.design, *n) > LARGE * largest)
             .map(|n| best.fit.set[n])
             .collect();
-        let mut few = self.pool.only(&self.grid, &large);
+        let mut few = self.design.only(&self.grid, &large);
         let mut changed = false;
         for step in SHARPENING_STEPS {
             let mut moved = false;
@@ -436,19 +436,19 @@ impl<'a> Engine<'a> {
             }
         }
         if changed {
-            let shaped: Vec<Candidate> = few.blocks.into_iter().map(|block| block.cause).collect();
-            let known: Vec<Option<usize>> = shaped.iter().map(|cause| self.block_of(cause)).collect();
+            let shaped: Vec<Candidate> = few.blocks.into_iter().map(|block| block.candidate).collect();
+            let known: Vec<Option<usize>> = shaped.iter().map(|candidate| self.block_of(candidate)).collect();
             let fresh: Vec<Candidate> =
-                shaped.into_iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(cause, _)| cause).collect();
-            let mut added = self.pool.add(&self.grid, self.rig, &fresh).into_iter();
+                shaped.into_iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(candidate, _)| candidate).collect();
+            let mut added = self.design.add(&self.grid, self.rig, &fresh).into_iter();
             self.large = Some(known.into_iter().filter_map(|k| k.or_else(|| added.next())).collect());
         }
         changed
     }
 
-    /// Block of the pool with the same cause.
-    fn block_of(&self, cause: &Candidate) -> Option<usize> {
-        self.pool.blocks.iter().position(|block| match (&block.cause, cause) {
+    /// Block of the design matrix with the same candidate.
+    fn block_of(&self, candidate: &Candidate) -> Option<usize> {
+        self.design.blocks.iter().position(|block| match (&block.candidate, candidate) {
             (Candidate::Unknown(a), Candidate::Unknown(b)) => a == b,
             (Candidate::Effect { number: m, shape: a, .. }, Candidate::Effect { number: n, shape: b, .. }) => {
                 m == n && a == b
@@ -457,12 +457,12 @@ impl<'a> Engine<'a> {
         })
     }
 
-    /// Tries the shapes about that of a pool's first block, and puts the best behind the others; true where that is another.
+    /// Tries the shapes about that of a design matrix's first block, and puts the best behind the others; true where that is another.
     fn sharpen_first(&self, few: &mut DesignMatrix, step: f64) -> bool {
         let all: Vec<usize> = (0..few.blocks.len()).collect();
         let whitened = self.noise.whiten(&self.grid, few);
         let Some(now) = evidence::fit(few, &whitened, &all, &[]) else { return false };
-        let fresh: Vec<Candidate> = match few.blocks[0].cause.clone() {
+        let fresh: Vec<Candidate> = match few.blocks[0].candidate.clone() {
             Candidate::Effect { effect, number, shape, cost_nats } => {
                 let refined = effect.refine(self.rig, &shape, &amplitudes_of(few, &whitened, &now, 0).beta);
                 let shapes = effect.neighbours(&shape, step).into_iter().chain(refined);
@@ -477,9 +477,9 @@ impl<'a> Engine<'a> {
         let start_rad: Vec<f64> = now.scales_rad[1..].iter().chain(&now.scales_rad[..1]).copied().collect();
         let best = fresh
             .into_par_iter()
-            .filter_map(|cause| {
+            .filter_map(|candidate| {
                 let mut tried = others.clone();
-                tried.add(&self.grid, self.rig, &[cause]).first()?;
+                tried.add(&self.grid, self.rig, &[candidate]).first()?;
                 let fit = evidence::fit(&tried, &self.noise.whiten(&self.grid, &tried), &all, &start_rad)?;
                 Some((fit.log_evidence, tried))
             })
@@ -492,16 +492,16 @@ impl<'a> Engine<'a> {
 
     /// Amplitudes of block `n` of a model in the effect's own units.
     fn raw(&self, model: &Model, n: usize) -> Estimate {
-        amplitudes_of(&self.pool, &self.whitened, &model.fit, n)
+        amplitudes_of(&self.design, &self.whitened, &model.fit, n)
     }
 }
 
 /// Amplitudes of block `n` of a fit in the effect's own units.
-fn amplitudes_of(pool: &DesignMatrix, whitened: &Whitened, fit: &evidence::Fit, n: usize) -> Estimate {
-    let block = &pool.blocks[fit.set[n]];
-    let place = fit.place(pool, n);
+fn amplitudes_of(design: &DesignMatrix, whitened: &Whitened, fit: &evidence::Fit, n: usize) -> Estimate {
+    let block = &design.blocks[fit.set[n]];
+    let place = fit.place(design, n);
     let mean = fit.mean.rows(place.start, place.len());
-    let covariance = evidence::covariance(pool, whitened, fit);
+    let covariance = evidence::covariance(design, whitened, fit);
     let covariance = covariance.view((place.start, place.start), (place.len(), place.len()));
     Estimate {
         beta: (&block.transform * mean).iter().copied().collect(),

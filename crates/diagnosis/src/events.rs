@@ -28,10 +28,10 @@ const STEPS_COST_NATS: [f64; 2] = [8.0, 6.5];
 const FEW_STEPS: usize = 3;
 /// Times that steps are moved.
 const SETTLING_PASSES: usize = 3;
-/// Most single steps of any size looked for, and the evidence from which one is taken into the pool, nats.
+/// Most single steps of any size looked for, and the evidence from which one is taken into the design matrix, nats.
 const SINGLE_STEPS: usize = 3;
 const SINGLE_STEP_NATS: f64 = 14.0;
-/// Evidence from which steps are taken into the pool, nats.
+/// Evidence from which steps are taken into the design matrix, nats.
 const STEPS_FOUND_NATS: f64 = 8.0;
 /// What the time of such a step costs, nats, in a run and between two: something happens as readily in one of the few pauses.
 const IN_RUN_NATS: f64 = 6.0;
@@ -48,7 +48,7 @@ const SIZE_RATIO: f64 = 1.26;
 const MOST_SHARED: u32 = 32;
 /// Frequencies of the search for tones.
 const TONE_STEPS: usize = 1 << 17;
-/// Log odds from which a tone is taken into the pool.
+/// Log odds from which a tone is taken into the design matrix.
 const TONE_NATS: f64 = 6.0;
 /// The same below a few turns' frequency, where the scatter is not white.
 const LOW_TONE_NATS: f64 = 60.0;
@@ -79,7 +79,7 @@ pub(super) fn steps_cost_nats(steps: usize) -> f64 {
 #[must_use]
 pub fn find(
     grid: &Grid,
-    pool: &DesignMatrix,
+    design: &DesignMatrix,
     noise: &Noise,
     amplitudes: &[(usize, f64)],
     steady: &[(usize, f64)],
@@ -100,9 +100,9 @@ pub fn find(
         }
         found.patterns.extend(single_steps(grid, &sectors, rest));
     };
-    look(&pool.rest(grid, amplitudes));
+    look(&design.rest(grid, amplitudes));
     if steady.len() < amplitudes.len() {
-        look(&pool.rest(grid, steady));
+        look(&design.rest(grid, steady));
     }
     found
 }
@@ -510,8 +510,8 @@ impl Band {
     }
 }
 
-/// Values at the points freed of what goes with the angle and, in the high band, is a slow wave of a revolution.
-fn freed(grid: &Grid, runs: &[ReducedRun], band: Band, value: &dyn Fn(&Point) -> f64) -> Vec<f64> {
+/// Values at the points detrended of what goes with the angle and, in the high band, is a slow wave of a revolution.
+fn detrended(grid: &Grid, runs: &[ReducedRun], band: Band, value: &dyn Fn(&Point) -> f64) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); grid.places.len()];
     let each = || runs.iter().zip(&grid.place_of_point).flat_map(|(run, places)| run.points.iter().zip(places));
     for (point, place) in each() {
@@ -528,7 +528,7 @@ fn strongest_tone(grid: &Grid, runs: &[ReducedRun], band: Band) -> Option<f64> {
     if grid.revolutions.len() < 2 || duration_s <= 0.0 {
         return None;
     }
-    let values = freed(grid, runs, band, &|point| point.rho_rad);
+    let values = detrended(grid, runs, band, &|point| point.rho_rad);
     let points: Vec<&Point> = runs.iter().flat_map(|run| &run.points).collect();
     let start_s = points.iter().map(|p| p.time_s).fold(f64::INFINITY, f64::min);
     let step_s = duration_s / (TONE_STEPS as f64 - 1.0);
@@ -560,7 +560,7 @@ fn strongest_tone(grid: &Grid, runs: &[ReducedRun], band: Band) -> Option<f64> {
 
 /// Refines the frequency, fits the tone and subtracts it; `None` where it is too small to matter.
 fn take_off_tone(runs: &mut [ReducedRun], grid: &Grid, frequency_hz: f64, band: Band) -> Option<Tone> {
-    let values = freed(grid, runs, band, &|point| point.rho_rad);
+    let values = detrended(grid, runs, band, &|point| point.rho_rad);
     let points: Vec<Point> = runs.iter().flat_map(|run| &run.points).copied().collect();
     let start_s = points.first()?.time_s;
     let explained = |frequency_hz: f64| {
@@ -582,10 +582,10 @@ fn take_off_tone(runs: &mut [ReducedRun], grid: &Grid, frequency_hz: f64, band: 
             .0;
         width_hz *= 0.5;
     }
-    // The tone's own waves lose to the angle what the residual lost: both are freed alike before the fit.
+    // The tone's own waves lose to the angle what the residual lost: both are detrended alike before the fit.
     let phase = |point: &Point| TAU * centre_hz * (point.time_s - start_s);
-    let sines = freed(grid, runs, band, &|point| phase(point).sin());
-    let cosines = freed(grid, runs, band, &|point| phase(point).cos());
+    let sines = detrended(grid, runs, band, &|point| phase(point).sin());
+    let cosines = detrended(grid, runs, band, &|point| phase(point).cos());
     let mut normal = nalgebra::Matrix2::zeros();
     let mut right = nalgebra::Vector2::zeros();
     let mut square = 0.0;
@@ -623,7 +623,7 @@ fn incoherent(grid: &Grid, band: Band, values: &[f64]) -> Vec<f64> {
     if band == Band::Low {
         return rest;
     }
-    let freed: Vec<Vec<f64>> = grid
+    let detrended: Vec<Vec<f64>> = grid
         .revolutions
         .par_iter()
         .map(|revolution| {
@@ -651,6 +651,6 @@ fn incoherent(grid: &Grid, band: Band, values: &[f64]) -> Vec<f64> {
         })
         .collect();
     // Revolutions stand one after the other.
-    rest.splice(.., freed.into_iter().flatten());
+    rest.splice(.., detrended.into_iter().flatten());
     rest
 }

@@ -1,6 +1,6 @@
 //! Evidence of a set of blocks: how probable the residual is when just these are there.
 //!
-//! An amplitude in the pool is the RMS of its trace, so a block of d columns has the prior N(0, s²/d) each, s its own scale:
+//! An amplitude in the design matrix is the RMS of its trace, so a block of d columns has the prior N(0, s²/d) each, s its own scale:
 //! one huge effect does not hide small ones. A candidate's scale is averaged over a grid from 1 µrad to 1 mrad; the scales of
 //! a set are then moved to where its evidence is largest, each at the cost of having been free.
 
@@ -47,19 +47,19 @@ impl Fit {
 
     /// Where block `n` of the set stands among the columns.
     #[must_use]
-    pub fn place(&self, pool: &DesignMatrix, n: usize) -> std::ops::Range<usize> {
-        let first = 1 + self.set[..n].iter().map(|b| pool.blocks[*b].width()).sum::<usize>();
-        first..first + pool.blocks[self.set[n]].width()
+    pub fn place(&self, design: &DesignMatrix, n: usize) -> std::ops::Range<usize> {
+        let first = 1 + self.set[..n].iter().map(|b| design.blocks[*b].width()).sum::<usize>();
+        first..first + design.blocks[self.set[n]].width()
     }
 
     /// RMS of the trace of block `n` of the set, rad.
     #[must_use]
-    pub fn rms_rad(&self, pool: &DesignMatrix, n: usize) -> f64 {
-        let place = self.place(pool, n);
+    pub fn rms_rad(&self, design: &DesignMatrix, n: usize) -> f64 {
+        let place = self.place(design, n);
         let mut square = 0.0;
         for a in place.clone() {
             for b in place.clone() {
-                square += self.mean[a] * self.mean[b] * pool.covariance(self.columns[a], self.columns[b]);
+                square += self.mean[a] * self.mean[b] * design.covariance(self.columns[a], self.columns[b]);
             }
         }
         square.max(0.0).sqrt()
@@ -81,8 +81,8 @@ fn prior(blocks: &[Block], set: &[usize], scales_rad: &[f64]) -> Vec<f64> {
 }
 
 /// Fits a set, its scales moved to where the evidence is largest. `None` where the columns cannot be told apart at all.
-pub fn fit(pool: &DesignMatrix, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -> Option<Fit> {
-    let blocks = &pool.blocks;
+pub fn fit(design: &DesignMatrix, whitened: &Whitened, set: &[usize], start_rad: &[f64]) -> Option<Fit> {
+    let blocks = &design.blocks;
     let columns = columns(blocks, set);
     let normal = NormalEquations::new(blocks, whitened, set, &columns);
     let mut scales_rad: Vec<f64> = (0..set.len()).map(|n| start_rad.get(n).copied().unwrap_or(3e-5)).collect();
@@ -120,20 +120,20 @@ pub fn fit(pool: &DesignMatrix, whitened: &Whitened, set: &[usize], start_rad: &
 
 /// Covariance of a fit's amplitudes under the noise that it was made with.
 #[must_use]
-pub fn covariance(pool: &DesignMatrix, whitened: &Whitened, fit: &Fit) -> DMatrix<f64> {
-    let normal = NormalEquations::new(&pool.blocks, whitened, &fit.set, &fit.columns);
+pub fn covariance(design: &DesignMatrix, whitened: &Whitened, fit: &Fit) -> DMatrix<f64> {
+    let normal = NormalEquations::new(&design.blocks, whitened, &fit.set, &fit.columns);
     let width = fit.columns.len();
     // What could be fitted can be solved.
-    let solved = normal.solve(&prior(&pool.blocks, &fit.set, &fit.scales_rad));
+    let solved = normal.solve(&prior(&design.blocks, &fit.set, &fit.scales_rad));
     solved.map_or_else(|| DMatrix::zeros(width, width), |solved| normal.covariance(&solved))
 }
 
 /// Log evidence of a fit's set at its scales under another noise, whose matrix holds the residual and the fit's columns only.
 #[must_use]
-pub(super) fn at_scales(pool: &DesignMatrix, whitened: &Whitened, fit: &Fit) -> f64 {
+pub(super) fn at_scales(design: &DesignMatrix, whitened: &Whitened, fit: &Fit) -> f64 {
     let columns: Vec<usize> = (1..=fit.columns.len()).collect();
     let (g, b) = select(&whitened.gram, &columns);
-    let evidence = log_evidence(g, b, &prior(&pool.blocks, &fit.set, &fit.scales_rad));
+    let evidence = log_evidence(g, b, &prior(&design.blocks, &fit.set, &fit.scales_rad));
     evidence - 0.5 * whitened.log_det - 0.5 * whitened.gram[(RESIDUAL, RESIDUAL)]
 }
 
@@ -142,7 +142,7 @@ fn log_evidence(gram: DMatrix<f64>, rhs: DVector<f64>, variances: &[f64]) -> f64
 }
 
 fn one_sided(block: &Block) -> bool {
-    matches!(block.cause, super::design_matrix::Candidate::Effect { effect, .. } if effect.one_sided())
+    matches!(block.candidate, super::design_matrix::Candidate::Effect { effect, .. } if effect.one_sided())
         && block.width() == 1
 }
 
@@ -167,9 +167,9 @@ fn normal_cdf(z: f64) -> f64 {
 }
 
 /// How much each candidate's addition to a fitted set would raise the log evidence, its scale averaged over the grid.
-pub fn scan(pool: &DesignMatrix, whitened: &Whitened, fit: &Fit, candidates: &[usize]) -> Vec<f64> {
+pub fn scan(design: &DesignMatrix, whitened: &Whitened, fit: &Fit, candidates: &[usize]) -> Vec<f64> {
     use rayon::prelude::*;
-    let blocks = &pool.blocks;
+    let blocks = &design.blocks;
     let gram = &whitened.gram;
     let (mut a, b) = select(gram, &fit.columns);
     for (n, variance) in prior(blocks, &fit.set, &fit.scales_rad).iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Points → revolutions × angle bins, with a station for every bin.
+//! Points → revolutions × angle bins, with an operating point for every bin.
 //!
 //! A revolution begins where its run begins, so that n full turns are n revolutions wherever they start. Columns that are
 //! the same in every revolution of a run are evaluated once a run and bin (a *cell*); columns that evolve, at every bin of
@@ -35,11 +35,11 @@ pub struct Grid {
     pub revolutions: Vec<Revolution>,
     /// Runs' senses.
     pub directions: Vec<Direction>,
-    /// OperatingPoint of every place.
+    /// Operating point of every place.
     pub places: Vec<OperatingPoint>,
     /// Cell of every place.
     pub cell_of: Vec<usize>,
-    /// OperatingPoint of every cell.
+    /// Operating point of every cell.
     pub cells: Vec<OperatingPoint>,
     /// Part of its revolution at which every cell stands, 0 to 1.
     pub part_of_cell: Vec<f64>,
@@ -192,7 +192,7 @@ impl Grid {
         let mut sums = vec![Sum::default(); revolutions * bins];
         let origin_rad = run.points[0].theta1_rad;
         let speeds = local_speeds(&run.points, frame.mean_speed);
-        let mut books = vec![RevolutionsByLoad::default(); revolutions * bins];
+        let mut revolutions_of_key = vec![RevolutionsByLoad::default(); revolutions * bins];
         let mut speed_sums = vec![0.0; revolutions * bins];
         let mut keys = Vec::with_capacity(run.points.len());
         let mut before = origin_rad;
@@ -225,15 +225,15 @@ impl Grid {
             sum.way += w * revolutions_by_load.way_rev.iter().sum::<f64>();
             speed_sums[key] += w * speed;
             for slot in 0..revolutions_by_load.load_nm.len() {
-                books[key].signed_rev[slot] += w * revolutions_by_load.signed_rev[slot];
-                books[key].way_rev[slot] += w * revolutions_by_load.way_rev[slot];
+                revolutions_of_key[key].signed_rev[slot] += w * revolutions_by_load.signed_rev[slot];
+                revolutions_of_key[key].way_rev[slot] += w * revolutions_by_load.way_rev[slot];
             }
         }
         let steady = frame.closes && steady_load(&run.points);
         let mut place_of_key = vec![usize::MAX; sums.len()];
         let mut cell_of_bin = vec![usize::MAX; bins];
         let first_cell = self.cells.len();
-        // Way of a cell's first station from the bin's middle, and the ways of all of its places.
+        // Way of a cell's first operating point from the bin's middle, and the ways of all of its places.
         let mut cell_sums: Vec<(f64, Sum)> = Vec::new();
         for revolution in 0..revolutions {
             let first = self.places.len();
@@ -244,28 +244,28 @@ impl Grid {
                     continue;
                 }
                 let w = sum.weight;
-                let mut station = rig.operating_point(sum.theta1 / w, sum.theta2 / w, run.direction);
-                station.load_nm = sum.load / w;
-                station.time_s = sum.time / w;
-                station.way_rev = sum.way / w;
-                station.speed_rad_per_s = speed_sums[key] / w;
-                station.run = index;
+                let mut at = rig.operating_point(sum.theta1 / w, sum.theta2 / w, run.direction);
+                at.load_nm = sum.load / w;
+                at.time_s = sum.time / w;
+                at.way_rev = sum.way / w;
+                at.speed_rad_per_s = speed_sums[key] / w;
+                at.run = index;
                 let (off_rad, variance_rad2) = sum.spread();
-                station.spread_rad = variance_rad2.sqrt();
-                station.revolutions_by_load = RevolutionsByLoad {
+                at.spread_rad = variance_rad2.sqrt();
+                at.revolutions_by_load = RevolutionsByLoad {
                     load_nm: revolutions_by_load.load_nm,
-                    signed_rev: books[key].signed_rev.map(|x| x / w),
-                    way_rev: books[key].way_rev.map(|x| x / w),
+                    signed_rev: revolutions_of_key[key].signed_rev.map(|x| x / w),
+                    way_rev: revolutions_of_key[key].way_rev.map(|x| x / w),
                 };
                 if !steady || *cell == usize::MAX {
                     *cell = self.cells.len();
-                    self.cells.push(station);
+                    self.cells.push(at);
                     self.part_of_cell.push((bin as f64 + 0.5) / bins as f64);
                     cell_sums.push((off_rad, Sum::default()));
                 }
                 cell_sums[*cell - first_cell].1.add_spread(w, off_rad, variance_rad2);
                 place_of_key[key] = self.places.len();
-                self.places.push(station);
+                self.places.push(at);
                 self.cell_of.push(*cell);
                 self.rho_rad.push(sum.rho / w);
                 self.weight.push(w);
@@ -298,7 +298,7 @@ struct RunFrame {
     mean_speed: f64,
 }
 
-/// Distinct values, at most as many as a revolutions_by_load holds; nearer than 2 % of the largest count as one.
+/// Distinct values, at most as many as are booked apart; nearer than 2 % of the largest count as one.
 fn levels(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut found: Vec<(f64, f64)> = Vec::new();
     let mut sorted: Vec<f64> = values.filter(|v| v.is_finite()).collect();
@@ -313,7 +313,7 @@ fn levels(values: impl Iterator<Item = f64>) -> Vec<f64> {
             _ => found.push((value, 1.0)),
         }
     }
-    // More levels than a revolutions_by_load has: the nearest neighbours become one.
+    // More levels than are booked apart: the nearest neighbours become one.
     while found.len() > gearmodel::effect::MOST_LOADS {
         let Some(at) =
             (1..found.len()).min_by(|a, b| (found[*a].0 - found[*a - 1].0).total_cmp(&(found[*b].0 - found[*b - 1].0)))

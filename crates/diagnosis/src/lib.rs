@@ -3,7 +3,7 @@
 //! | step | file | what comes out |
 //! |---|---|---|
 //! | residual against the nominal model, by segments | `nominal`, `reduce`, `line_phase` | points, independent of the log's length |
-//! | revolutions × angle bins | `grid` | residual and station of every place |
+//! | revolutions × angle bins | `grid` | residual and operating point of every place |
 //! | columns of all effects and unknown patterns | `design_matrix`, `columns`, `nuisance_patterns` | sums from which every fit is made |
 //! | what does not repeat | `noise` | covariance by order, revolution and run |
 //! | how probable is a set of effects | `normal_equations`, `evidence`, `search` | models with their posterior |

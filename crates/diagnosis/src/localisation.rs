@@ -26,7 +26,7 @@ const TIMES: usize = 24;
 pub(super) struct Inputs<'a> {
     pub(super) rig: &'a Rig,
     pub(super) grid: &'a Grid,
-    pub(super) pool: &'a DesignMatrix,
+    pub(super) design: &'a DesignMatrix,
     pub(super) noise: &'a Noise,
     pub(super) best: &'a Fit,
     pub(super) lines: &'a [LineError],
@@ -138,11 +138,11 @@ fn amplitude(grid: &Grid, rest: &[f64], phase: &dyn Fn(&OperatingPoint) -> f64) 
 /// The signature: the row of the largest effect or unknown pattern in the best model, freed of what the plan cannot tell; that of
 /// nothing where there is none.
 fn signature(inputs: &Inputs<'_>) -> Signature {
-    let Inputs { rig, grid, pool, best, lines, .. } = inputs;
+    let Inputs { rig, grid, design, best, lines, .. } = inputs;
     let mut largest: Option<(f64, Signature)> = None;
     for (n, b) in best.set.iter().enumerate() {
-        let size = best.rms_rad(pool, n).powi(2);
-        let row = match &pool.blocks[*b].cause {
+        let size = best.rms_rad(design, n).powi(2);
+        let row = match &design.blocks[*b].candidate {
             Candidate::Effect { effect, shape, .. } => effect.signature_of(rig, shape),
             Candidate::Unknown(pattern) => pattern.signature(),
         };
@@ -215,9 +215,9 @@ pub(super) fn warnings(grid: &Grid, noise: &Noise) -> Vec<String> {
 }
 
 /// Residual over the turn before and after, run by run.
-pub(super) fn curves(grid: &Grid, pool: &DesignMatrix, best: &Fit) -> Vec<Curve> {
+pub(super) fn curves(grid: &Grid, design: &DesignMatrix, best: &Fit) -> Vec<Curve> {
     let zero = best.mean[0];
-    let trace = pool.trace(grid, &best.amplitudes());
+    let trace = design.trace(grid, &best.amplitudes());
     let mut curves = Vec::new();
     for (run, direction) in grid.directions.iter().enumerate() {
         let mut sums = vec![(0.0, 0.0, 0.0); grid.bins];

@@ -4,7 +4,7 @@
 //! turn, 0 … 8, and what goes from one level to the next within a revolution: a ramp, alone and on order 1. Wave n has
 //! variance λ_n between revolutions and κ λ_n between runs (κ of the level its own), white noise σ²/samples. With
 //! Z the waves at the places, V = σ²W⁻¹ + Z Λ Zᵀ (+ the same across a run), inverted by Woodbury's identity on the sums
-//! of the pool. Samples are not independent: treated as such, a null campaign shows false effects more often than not.
+//! of the design matrix. Samples are not independent: treated as such, a null campaign shows false effects more often than not.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -44,7 +44,7 @@ pub struct Noise {
 
 /// Everything a fit needs under one noise.
 pub struct Whitened {
-    /// XᵀV⁻¹X of all columns of the pool.
+    /// XᵀV⁻¹X of all columns of the design matrix.
     pub gram: DMatrix<f64>,
     /// log det V + constant.
     pub log_det: f64,
@@ -80,8 +80,8 @@ impl Noise {
     /// Estimates the scatter from what differs between revolutions of a run after the model `amplitudes` (column,
     /// amplitude) is taken off.
     #[must_use]
-    pub fn estimate(grid: &Grid, pool: &DesignMatrix, amplitudes: &[(usize, f64)]) -> Self {
-        let residual_waves: Vec<_> = pool
+    pub fn estimate(grid: &Grid, design: &DesignMatrix, amplitudes: &[(usize, f64)]) -> Self {
+        let residual_waves: Vec<_> = design
             .waves
             .iter()
             .map(|c| {
@@ -95,7 +95,7 @@ impl Noise {
         let fitted: Vec<Option<_>> = grid
             .revolutions
             .iter()
-            .zip(pool.wave_products())
+            .zip(design.wave_products())
             .zip(&residual_waves)
             .map(|((revolution, k), e)| {
                 // Without the ramps: over a whole turn they are nearly sums of the orders.
@@ -103,7 +103,7 @@ impl Noise {
                 (revolution.coverage >= FULL).then(|| Cholesky::new(k).map(|c| c.solve(&e))).flatten()
             })
             .collect();
-        let rest = pool.rest(grid, amplitudes);
+        let rest = design.rest(grid, amplitudes);
         let (white_rad2, weight) = white(grid, &fitted, &rest);
         // Squared differences between neighbouring revolutions, by order.
         let mut squares: Vec<Vec<f64>> = vec![Vec::new(); ORDERS + 1];
@@ -144,7 +144,7 @@ impl Noise {
         order_rad2[ORDERS + 2] = RAMP * order_rad2[1];
         let wave_rad2 = wave_rad2(&order_rad2);
         let passing = |k: &DMatrix<f64>| Passing::new(&(k / white_rad2), &wave_rad2);
-        let revolutions = Arc::new(pool.wave_products().par_iter().map(passing).collect());
+        let revolutions = Arc::new(design.wave_products().par_iter().map(passing).collect());
         Self { white_rad2, order_rad2, run_ratio: FIRST_RUN_RATIO, freedom, revolutions }
     }
 
@@ -158,8 +158,8 @@ impl Noise {
 
     /// XᵀV⁻¹X and log det V.
     #[must_use]
-    pub fn whiten(&self, grid: &Grid, pool: &DesignMatrix) -> Whitened {
-        self.within_runs(grid, pool, None).between_runs(self.run_ratio)
+    pub fn whiten(&self, grid: &Grid, design: &DesignMatrix) -> Whitened {
+        self.within_runs(grid, design, None).between_runs(self.run_ratio)
     }
 
     /// How the waves of a revolution are whitened.
@@ -174,12 +174,12 @@ impl Noise {
 
     /// Everything that does not depend on the scatter between runs, of all columns or of some.
     #[must_use]
-    pub(super) fn within_runs(&self, grid: &Grid, pool: &DesignMatrix, only: Option<&[usize]>) -> WithinRuns {
+    pub(super) fn within_runs(&self, grid: &Grid, design: &DesignMatrix, only: Option<&[usize]>) -> WithinRuns {
         let precision = 1.0 / self.white_rad2;
         let wave_rad2 = wave_rad2(&self.order_rad2);
         let mut gram = match only {
-            None => pool.products.clone(),
-            Some(columns) => pool.products.select_rows(columns).select_columns(columns),
+            None => design.products.clone(),
+            Some(columns) => design.products.select_rows(columns).select_columns(columns),
         };
         gram *= precision;
         let p = gram.ncols();
@@ -192,8 +192,8 @@ impl Noise {
             let Some(passing) = self.revolution(number) else { continue };
             log_det += passing.log_det;
             let c = match only {
-                None => &pool.waves[number] * precision,
-                Some(columns) => pool.waves[number].select_columns(columns) * precision,
+                None => &design.waves[number] * precision,
+                Some(columns) => design.waves[number].select_columns(columns) * precision,
             };
             left[revolution.run] += &passing.left;
             waves[revolution.run].gemm(1.0, &passing.on, &c, 1.0);

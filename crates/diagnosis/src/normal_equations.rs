@@ -1,4 +1,4 @@
-//! NormalEquations equations of a set of blocks: amplitudes, their covariance and the evidence under any prior variances.
+//! Normal equations of a set of blocks: amplitudes, their covariance and the evidence under any prior variances.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 use super::design_matrix::{Block, RESIDUAL, WIDE};
 use super::noise::Whitened;
 
-/// NormalEquations equations of a set, the columns of its widest block turned to where their part is diagonal: they then cost no more than a
+/// Normal equations of a set, the columns of its widest block turned to where their part is diagonal: they then cost no more than a
 /// diagonal does, however often the scales are moved.
 pub(super) struct NormalEquations {
     /// Columns of the set that are turned.

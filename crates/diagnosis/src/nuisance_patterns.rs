@@ -320,7 +320,7 @@ impl Pattern {
         }
     }
 
-    /// Values at a station.
+    /// Values at an operating point.
     pub fn row(&self, at: &OperatingPoint, row: &mut [f64]) {
         let scale = |weight: Weight, mean: f64, odd: bool| {
             let size = match weight {

@@ -29,7 +29,7 @@ pub struct Posterior {
 }
 
 fn number(block: &Block) -> Option<usize> {
-    match &block.cause {
+    match &block.candidate {
         Candidate::Effect { number, .. } => Some(*number),
         Candidate::Unknown(_) => None,
     }
@@ -37,7 +37,7 @@ fn number(block: &Block) -> Option<usize> {
 
 /// Posterior of effects. `sharpness` under 1 flattens what the noise model's own error makes too sure.
 #[must_use]
-pub fn posterior(pool: &DesignMatrix, models: &[Model], sharpness: f64) -> Posterior {
+pub fn posterior(design: &DesignMatrix, models: &[Model], sharpness: f64) -> Posterior {
     let best = models.first().map_or(0.0, |m| m.score);
     let mut weights: Vec<f64> = models.iter().map(|m| (sharpness * (m.score - best)).exp()).collect();
     let total: f64 = weights.iter().sum();
@@ -48,7 +48,7 @@ pub fn posterior(pool: &DesignMatrix, models: &[Model], sharpness: f64) -> Poste
     for (model, weight) in models.iter().zip(&weights) {
         let mut outside = false;
         for b in &model.fit.set {
-            match number(&pool.blocks[*b]) {
+            match number(&design.blocks[*b]) {
                 Some(n) => {
                     probability[n] += weight;
                     // Models come best first.
@@ -67,8 +67,8 @@ pub fn posterior(pool: &DesignMatrix, models: &[Model], sharpness: f64) -> Poste
 /// Largest principal angle between two blocks' subspaces, of the smaller one's directions, as the noise weighs them and with
 /// the zero free, deg.
 #[must_use]
-pub fn angle_deg(pool: &DesignMatrix, whitened: &Whitened, a: usize, b: usize) -> f64 {
-    let (a, b) = (&pool.blocks[a], &pool.blocks[b]);
+pub fn angle_deg(design: &DesignMatrix, whitened: &Whitened, a: usize, b: usize) -> f64 {
+    let (a, b) = (&design.blocks[a], &design.blocks[b]);
     let g = &whitened.gram;
     let zero = g[(ZERO, ZERO)];
     let entry = |m: usize, n: usize| g[(m, n)] - g[(m, ZERO)] * g[(n, ZERO)] / zero;
@@ -89,7 +89,7 @@ pub fn angle_deg(pool: &DesignMatrix, whitened: &Whitened, a: usize, b: usize) -
 /// with the angle, the effect itself not included.
 #[must_use]
 pub fn confusable(
-    pool: &DesignMatrix,
+    design: &DesignMatrix,
     whitened: &Whitened,
     posterior: &Posterior,
     effect: usize,
@@ -97,14 +97,14 @@ pub fn confusable(
     best_score: f64,
 ) -> Vec<(usize, f64)> {
     let Some(own) = posterior.block[effect] else { return Vec::new() };
-    let own_width = pool.blocks[own].width();
+    let own_width = design.blocks[own].width();
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
-    for (b, block) in pool.blocks.iter().enumerate() {
+    for (b, block) in design.blocks.iter().enumerate() {
         let Some(n) = number(block) else { continue };
         if n == effect || block.width() * MUCH_WIDER < own_width || own_width * MUCH_WIDER < block.width() {
             continue;
         }
-        let angle = angle_deg(pool, whitened, own, b);
+        let angle = angle_deg(design, whitened, own, b);
         if angle >= SAME_DEG {
             continue;
         }

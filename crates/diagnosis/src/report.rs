@@ -71,17 +71,17 @@ struct Finding {
 
 impl Engine<'_> {
     pub(super) fn report(&self, lines: &[LineError]) -> Option<Diagnosis> {
-        let posterior = posterior::posterior(&self.pool, &self.models, SHARPNESS);
+        let posterior = posterior::posterior(&self.design, &self.models, SHARPNESS);
         let best = self.models.first()?;
-        let mut search = self.search_in(&self.pool, &self.whitened);
+        let mut search = self.search_in(&self.design, &self.whitened);
         let mut findings = self.findings(&posterior, best, &mut search, lines);
 
         // Held-out shrink: of the best model, and of each effect alone.
         let mut columns: Vec<usize> = best.fit.columns.clone();
-        columns.extend(findings.iter().filter_map(|f| f.block).flat_map(|b| self.pool.blocks[b].columns.clone()));
+        columns.extend(findings.iter().filter_map(|f| f.block).flat_map(|b| self.design.blocks[b].columns.clone()));
         columns.sort_unstable();
         columns.dedup();
-        let held_out = HeldOut::new(&self.grid, &self.pool, &self.noise, &columns);
+        let held_out = HeldOut::new(&self.grid, &self.design, &self.noise, &columns);
         let floor_rad2 = held_out.floor_rad2(&self.grid, &self.noise);
         let before = held_out.errors(&Selection::default());
         let after = held_out.errors(&self.selection(best, None));
@@ -95,10 +95,10 @@ impl Engine<'_> {
         for finding in &mut findings {
             finding.shrink = match finding.block {
                 Some(block) if reducible > 0.0 => {
-                    let d = self.pool.blocks[block].width() as f64;
+                    let d = self.design.blocks[block].width() as f64;
                     let scale = finding.rms_rad.max(1e-6);
                     let alone = held_out.errors(&Selection {
-                        columns: self.pool.blocks[block].columns.clone().collect(),
+                        columns: self.design.blocks[block].columns.clone().collect(),
                         prior_rad2: vec![scale * scale / d; d as usize],
                     });
                     Some((before.mean() - alone.mean()) / reducible)
@@ -114,8 +114,8 @@ impl Engine<'_> {
             .sum::<f64>();
         // What is too small to matter beside what was found, or beside what does not repeat.
         let unknown_rad2: f64 = (0..best.fit.set.len())
-            .filter(|n| matches!(self.pool.blocks[best.fit.set[*n]].cause, Candidate::Unknown(_)))
-            .map(|n| best.fit.rms_rad(&self.pool, n).powi(2))
+            .filter(|n| matches!(self.design.blocks[best.fit.set[*n]].candidate, Candidate::Unknown(_)))
+            .map(|n| best.fit.rms_rad(&self.design, n).powi(2))
             .sum();
         let least_rad = least_rad(total_rad2 + unknown_rad2 + explained_rad2, self.rings_rad2(best), gap.floor_rad);
         let left: Vec<(&[&str], f64)> = findings
@@ -161,7 +161,7 @@ impl Engine<'_> {
         let location = localisation::locate(&localisation::Inputs {
             rig: self.rig,
             grid: &self.grid,
-            pool: &self.pool,
+            design: &self.design,
             noise: &self.noise,
             best: &best.fit,
             lines,
@@ -171,7 +171,7 @@ impl Engine<'_> {
         warnings.extend(self.mimics(&findings, &verdict));
         let next =
             experiment_design::experiments(&self.grid, &findings_for_next(&findings, &groups), &unknown, &warnings);
-        let curves = localisation::curves(&self.grid, &self.pool, &best.fit);
+        let curves = localisation::curves(&self.grid, &self.design, &best.fit);
         Some(Diagnosis {
             gap,
             location,
@@ -192,7 +192,7 @@ impl Engine<'_> {
         let mut selection = Selection::default();
         for (n, (block, scale)) in model.fit.set.iter().zip(&model.fit.scales_rad).enumerate() {
             if Some(n) != left_out {
-                let columns = self.pool.blocks[*block].columns.clone();
+                let columns = self.design.blocks[*block].columns.clone();
                 selection.prior_rad2.extend(columns.clone().map(|_| scale * scale / columns.len() as f64));
                 selection.columns.extend(columns);
             }
@@ -211,8 +211,8 @@ impl Engine<'_> {
         let mut findings = Vec::new();
         let empty = search.model(Vec::new(), None);
         for (number, effect) in LIBRARY.iter().enumerate() {
-            let own: Vec<usize> = (0..self.pool.blocks.len())
-                .filter(|b| matches!(&self.pool.blocks[*b].cause, Candidate::Effect { number: n, .. } if *n == number))
+            let own: Vec<usize> = (0..self.design.blocks.len())
+                .filter(|b| matches!(&self.design.blocks[*b].candidate, Candidate::Effect { number: n, .. } if *n == number))
                 .collect();
             if let Some(encoder) = INTERPOLATION.iter().position(|n| *n == effect.name()) {
                 findings.push(self.line_finding(number, encoder, lines));
@@ -221,7 +221,7 @@ impl Engine<'_> {
             let block = posterior.block[number].or_else(|| {
                 // Never part of a good model: the shape that fits best alone.
                 let empty = empty.as_ref()?;
-                let gains = evidence::scan(&self.pool, &self.whitened, &empty.fit, &own);
+                let gains = evidence::scan(&self.design, &self.whitened, &empty.fit, &own);
                 own.iter().zip(gains).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(b, _)| *b)
             });
             let Some(block) = block else { continue };
@@ -231,7 +231,7 @@ impl Engine<'_> {
                     .set
                     .iter()
                     .copied()
-                    .find(|b| posterior::angle_deg(&self.pool, &self.whitened, *b, block) < posterior::SAME_DEG)
+                    .find(|b| posterior::angle_deg(&self.design, &self.whitened, *b, block) < posterior::SAME_DEG)
             });
             let in_best = stands_for == Some(block);
             let mut model_with = |out: Option<usize>, b: usize| {
@@ -246,7 +246,7 @@ impl Engine<'_> {
             };
             let confusable = match reference.filter(|_| posterior.probability[number] > 0.02) {
                 Some(reference) => confusable(
-                    &self.pool,
+                    &self.design,
                     &self.whitened,
                     posterior,
                     number,
@@ -255,14 +255,14 @@ impl Engine<'_> {
                 ),
                 None => Vec::new(),
             };
-            // Amplitudes: in the best model, in place of its twin or of another shape there, or beside it.
+            // Amplitudes: in the best model, in place of one with its trace or of another shape there, or beside it.
             let other_shape = best.fit.set.iter().copied().find(|b| own.contains(b));
             let model = if in_best { Some(best.clone()) } else { model_with(other_shape.or(stands_for), block) };
             let estimate = model.as_ref().and_then(|m| {
                 let n = m.fit.set.iter().position(|b| *b == block)?;
-                Some((self.raw(m, n), m.fit.rms_rad(&self.pool, n)))
+                Some((self.raw(m, n), m.fit.rms_rad(&self.design, n)))
             });
-            let shape = match &self.pool.blocks[block].cause {
+            let shape = match &self.design.blocks[block].candidate {
                 Candidate::Effect { shape, .. } => shape.clone(),
                 Candidate::Unknown(_) => Vec::new(),
             };
@@ -366,7 +366,7 @@ impl Engine<'_> {
                     .zip(&posterior.weights)
                     .filter(|(m, _)| {
                         m.fit.set.iter().any(|b| {
-                            matches!(&self.pool.blocks[*b].cause, Candidate::Effect { number, .. } if members.contains(number))
+                            matches!(&self.design.blocks[*b].candidate, Candidate::Effect { number, .. } if members.contains(number))
                         })
                     })
                     .map(|(_, w)| w)
@@ -376,7 +376,7 @@ impl Engine<'_> {
             let probability = probability.min(finding.most);
             let in_best = finding.block.is_none()
                 || best.fit.set.iter().any(
-                    |b| matches!(&self.pool.blocks[*b].cause, Candidate::Effect { number, .. } if members.contains(number)),
+                    |b| matches!(&self.design.blocks[*b].candidate, Candidate::Effect { number, .. } if members.contains(number)),
                 );
             if members.len() > 1 {
                 if probability < 0.02 {
@@ -405,8 +405,8 @@ impl Engine<'_> {
         let mut known = 0.0;
         let mut strongest: Option<(f64, &Pattern)> = None;
         for (n, b) in best.fit.set.iter().enumerate() {
-            let size = best.fit.rms_rad(&self.pool, n).powi(2);
-            match &self.pool.blocks[*b].cause {
+            let size = best.fit.rms_rad(&self.design, n).powi(2);
+            match &self.design.blocks[*b].candidate {
                 Candidate::Unknown(pattern) => {
                     square += size;
                     if strongest.as_ref().is_none_or(|(s, _)| size > *s) {
@@ -419,19 +419,19 @@ impl Engine<'_> {
         // A resonance that was found rings whenever anything excites it; faster than the bins show, it cannot be told from knocks.
         let slowest_hz = self.grid.plan.speeds_rad_per_s.first().map_or(0.0, |speed| speed / std::f64::consts::TAU);
         let shown_hz = 0.5 * self.grid.bins as f64 * slowest_hz;
-        let own = |knocks: &&Knocks| {
-            self.rings_hz(best).any(|(_, hz)| hz > shown_hz || (knocks.ring_hz / hz).ln().abs() < SAME_RING)
+        let own = |transients: &&Transients| {
+            self.rings_hz(best).any(|(_, hz)| hz > shown_hz || (transients.ring_hz / hz).ln().abs() < SAME_RING)
         };
-        let knocks = self.aside.knocks.as_ref().filter(|knocks| !own(knocks));
-        square += self.aside.tones_rad2() + knocks.map_or(0.0, |knocks| knocks.mean_square_rad2);
+        let transients = self.aside.transients.as_ref().filter(|transients| !own(transients));
+        square += self.aside.tones_rad2() + transients.map_or(0.0, |transients| transients.mean_square_rad2);
         let rms_rad = square.sqrt();
         let least_rad = least_rad(known.max(lines_rad2), self.rings_rad2(best), floor_rad);
-        if let Some(knocks) = knocks.filter(|knocks| knocks.mean_square_rad2.sqrt() > least_rad) {
+        if let Some(transients) = transients.filter(|transients| transients.mean_square_rad2.sqrt() > least_rad) {
             let description = format!(
                 "{} knocks or lost readings of up to {:.0} urad, the first at {:.2} s",
-                knocks.count,
-                knocks.peak_rad * 1e6,
-                knocks.first_s
+                transients.count,
+                transients.peak_rad * 1e6,
+                transients.first_s
             );
             let signature = Signature::steady(Carrier::None, Parity::Mixed);
             let location = Some(UnknownLocation { description, signature });
@@ -459,7 +459,7 @@ impl Engine<'_> {
 
     /// Where in a model's set resonances stand, and their frequencies, Hz.
     fn rings_hz(&self, model: &Model) -> impl Iterator<Item = (usize, f64)> {
-        (0..model.fit.set.len()).filter_map(|n| match &self.pool.blocks[model.fit.set[n]].cause {
+        (0..model.fit.set.len()).filter_map(|n| match &self.design.blocks[model.fit.set[n]].candidate {
             Candidate::Effect { effect, shape, .. } => Some((n, effect.rings_hz(shape, &self.raw(model, n))?)),
             Candidate::Unknown(_) => None,
         })
@@ -467,7 +467,7 @@ impl Engine<'_> {
 
     /// Mean square of the resonances in a model, rad².
     fn rings_rad2(&self, model: &Model) -> f64 {
-        self.rings_hz(model).map(|(n, _)| model.fit.rms_rad(&self.pool, n).powi(2)).sum()
+        self.rings_hz(model).map(|(n, _)| model.fit.rms_rad(&self.design, n).powi(2)).sum()
     }
 
     /// Shares of the reducible gap: each effect's part of the whole fitted trace.
@@ -481,22 +481,22 @@ impl Engine<'_> {
         let covariance = |a: std::ops::Range<usize>, beta: &dyn Fn(usize) -> f64| -> f64 {
             a.map(|m| {
                 (1..columns.len())
-                    .map(|n| beta(m) * beta(n) * self.pool.covariance(columns[m], columns[n]))
+                    .map(|n| beta(m) * beta(n) * self.design.covariance(columns[m], columns[n]))
                     .sum::<f64>()
             })
             .sum()
         };
         let mean = |n: usize| best.fit.mean[n];
-        let of_amplitudes = evidence::covariance(&self.pool, &self.whitened, &best.fit);
+        let of_amplitudes = evidence::covariance(&self.design, &self.whitened, &best.fit);
         let mut explained = 0.0;
         for (n, b) in best.fit.set.iter().enumerate() {
-            let place = best.fit.place(&self.pool, n);
+            let place = best.fit.place(&self.design, n);
             let share = covariance(place.clone(), &mean) / reducible;
             let deviation = place.clone().map(|m| of_amplitudes[(m, m)]).sum::<f64>().sqrt()
                 * 2.0
                 * (share.abs() / reducible).sqrt();
             explained += share;
-            let effect = match &self.pool.blocks[*b].cause {
+            let effect = match &self.design.blocks[*b].candidate {
                 Candidate::Effect { effect, .. } => effect.name().to_owned(),
                 Candidate::Unknown(pattern) => format!("unknown: {}", pattern.describe()),
             };
@@ -553,7 +553,7 @@ impl Engine<'_> {
                 chosen
                     .iter()
                     .map(|b| match (a.block, b.block) {
-                        (Some(a), Some(b)) if a != b => posterior::angle_deg(&self.pool, &self.whitened, a, b),
+                        (Some(a), Some(b)) if a != b => posterior::angle_deg(&self.design, &self.whitened, a, b),
                         _ => 0.0,
                     })
                     .collect()
@@ -571,17 +571,18 @@ impl Engine<'_> {
         }
         for target in findings.iter().filter(|f| f.probability < 0.3 && f.block.is_some()) {
             let Some(block) = target.block else { continue };
-            if self.pool.blocks[block].width() > 4 {
+            if self.design.blocks[block].width() > 4 {
                 continue;
             }
             for (n, a) in named.iter().enumerate() {
                 for b in &named[n + 1..] {
                     let (Some(x), Some(y)) = (a.block, b.block) else { continue };
-                    if self.pool.blocks[x].width() + self.pool.blocks[y].width() > 8 {
+                    if self.design.blocks[x].width() + self.design.blocks[y].width() > 8 {
                         continue;
                     }
                     // Where one alone looks like it, or both are one group, the sum says nothing new.
-                    let near = |m: usize, n: usize| posterior::angle_deg(&self.pool, &self.whitened, m, n) < MIMIC_DEG;
+                    let near =
+                        |m: usize, n: usize| posterior::angle_deg(&self.design, &self.whitened, m, n) < MIMIC_DEG;
                     if near(block, x) || near(block, y) || near(x, y) || warnings.len() >= MOST_MIMICS {
                         continue;
                     }
@@ -604,8 +605,9 @@ impl Engine<'_> {
         let g = &self.whitened.gram;
         let zero = g[(1, 1)];
         let entry = |m: usize, n: usize| g[(m, n)] - g[(m, 1)] * g[(n, 1)] / zero;
-        let sum: Vec<usize> = self.pool.blocks[a].columns.clone().chain(self.pool.blocks[b].columns.clone()).collect();
-        let own: Vec<usize> = self.pool.blocks[target].columns.clone().collect();
+        let sum: Vec<usize> =
+            self.design.blocks[a].columns.clone().chain(self.design.blocks[b].columns.clone()).collect();
+        let own: Vec<usize> = self.design.blocks[target].columns.clone().collect();
         let part = |rows: &[usize], columns: &[usize]| {
             nalgebra::DMatrix::from_fn(rows.len(), columns.len(), |m, n| entry(rows[m], columns[n]))
         };

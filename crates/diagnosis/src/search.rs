@@ -55,7 +55,7 @@ type Ranking = Vec<(usize, f64)>;
 
 /// Everything seen on the way.
 pub struct Search<'a> {
-    pool: &'a DesignMatrix,
+    design: &'a DesignMatrix,
     whitened: &'a Whitened,
     /// Constant of this noise: what the evidence of the empty set lacks.
     offset: f64,
@@ -69,14 +69,15 @@ pub struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search in a pool under one noise.
+    /// A search in a design matrix under one noise.
     #[must_use]
-    pub fn new(pool: &'a DesignMatrix, whitened: &'a Whitened, known: &[String], least_rad: f64) -> Self {
-        let unknowns = pool.blocks.iter().filter(|b| matches!(b.cause, Candidate::Unknown(_))).count().max(1) as f64;
-        let priors = pool
+    pub fn new(design: &'a DesignMatrix, whitened: &'a Whitened, known: &[String], least_rad: f64) -> Self {
+        let unknowns =
+            design.blocks.iter().filter(|b| matches!(b.candidate, Candidate::Unknown(_))).count().max(1) as f64;
+        let priors = design
             .blocks
             .iter()
-            .map(|block| match &block.cause {
+            .map(|block| match &block.candidate {
                 // What is known to be there needs no evidence.
                 Candidate::Effect { effect, .. } if known.iter().any(|name| name == effect.name()) => KNOWN_NATS,
                 Candidate::Effect { cost_nats, .. } => EFFECT_ODDS.ln() - cost_nats,
@@ -84,12 +85,12 @@ impl<'a> Search<'a> {
             })
             .collect();
         let offset = -0.5 * whitened.log_det - 0.5 * whitened.gram[(0, 0)];
-        let largest_rad = LARGEST * pool.residual_rms_rad();
-        Self { pool, whitened, offset, least_rad, largest_rad, priors, seen: HashMap::new(), scanned: HashMap::new() }
+        let largest_rad = LARGEST * design.residual_rms_rad();
+        Self { design, whitened, offset, least_rad, largest_rad, priors, seen: HashMap::new(), scanned: HashMap::new() }
     }
 
     fn library(&self, block: usize) -> Option<usize> {
-        match &self.pool.blocks[block].cause {
+        match &self.design.blocks[block].candidate {
             Candidate::Effect { number, .. } => Some(*number),
             Candidate::Unknown(_) => None,
         }
@@ -118,26 +119,29 @@ impl<'a> Search<'a> {
                 near.and_then(|fit| fit.set.iter().position(|x| x == b).map(|n| fit.scales_rad[n])).unwrap_or(3e-5)
             })
             .collect();
-        let fit = fit(self.pool, self.whitened, set, &start)?;
-        let possible = (0..set.len()).all(|n| (self.least_rad..self.largest_rad).contains(&fit.rms_rad(self.pool, n)));
-        let causes = || set.iter().map(|b| &self.pool.blocks[*b].cause);
-        let chances = causes().flat_map(|a| causes().map(|b| a.coincides(b))).filter(|same| *same).count();
+        let fit = fit(self.design, self.whitened, set, &start)?;
+        let possible =
+            (0..set.len()).all(|n| (self.least_rad..self.largest_rad).contains(&fit.rms_rad(self.design, n)));
+        let candidates = || set.iter().map(|b| &self.design.blocks[*b].candidate);
+        let chances = candidates().flat_map(|a| candidates().map(|b| a.coincides(b))).filter(|same| *same).count();
         let prior = set.iter().map(|b| self.priors[*b]).sum::<f64>() - CHANCE_NATS * chances as f64;
         possible.then_some(Model { score: self.offset + fit.log_evidence + prior, fit })
     }
 
     /// Candidates that may join a set: one shape of an effect at a time.
     fn open(&self, set: &[usize], allowed: Allowed) -> Vec<usize> {
-        (0..self.pool.blocks.len())
+        (0..self.design.blocks.len())
             .filter(|b| !set.contains(b))
             .filter(|b| match self.library(*b) {
                 Some(number) => {
-                    (allowed != Allowed::Narrow || self.pool.blocks[*b].width() <= WIDE)
+                    (allowed != Allowed::Narrow || self.design.blocks[*b].width() <= WIDE)
                         && !set.iter().any(|s| self.library(*s) == Some(number))
                 }
                 None => allowed == Allowed::All,
             })
-            .filter(|b| !set.iter().any(|s| self.pool.blocks[*s].cause.excludes(&self.pool.blocks[*b].cause)))
+            .filter(|b| {
+                !set.iter().any(|s| self.design.blocks[*s].candidate.excludes(&self.design.blocks[*b].candidate))
+            })
             .collect()
     }
 
@@ -148,7 +152,7 @@ impl<'a> Search<'a> {
             return known[..count.min(known.len())].to_vec();
         }
         let candidates = self.open(&model.fit.set, allowed);
-        let gains = scan(self.pool, self.whitened, &model.fit, &candidates);
+        let gains = scan(self.design, self.whitened, &model.fit, &candidates);
         let mut ranked: Ranking =
             candidates.iter().zip(gains).map(|(b, gain)| (*b, model.score + gain + self.priors[*b])).collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));

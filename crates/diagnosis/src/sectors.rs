@@ -73,7 +73,7 @@ pub(super) fn worth(grid: &Grid, sectors: &[Sector], pattern: &Pattern) -> f64 {
     let mut weighted = columns.clone();
     weighted.column_iter_mut().for_each(|mut column| column.component_mul_assign(&weights));
     let (gram, rhs) = (columns.tr_mul(&weighted), weighted.tr_mul(&values));
-    // As in the pool: an amplitude of the block is the RMS of its trace.
+    // As in the design matrix: an amplitude of the block is the RMS of its trace.
     let scale2 = width as f64 * total / gram.trace();
     evidence::gain(&(gram * scale2), &(rhs * scale2.sqrt()), width, false)
 }

@@ -31,7 +31,7 @@ const LEAST_RAD: f64 = 1e-9;
 
 /// Knocks that were cut out.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Knocks {
+pub struct Transients {
     /// How many.
     pub count: usize,
     /// Time of the first since the campaign's start, s.
@@ -45,7 +45,7 @@ pub struct Knocks {
 }
 
 /// Finds knocks and cuts their points out of the runs; `None` where there are none.
-pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
+pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Transients> {
     let mut cut = vec![false; grid.places.len()];
     let mut found: Vec<Window> = Vec::new();
     // Where they crowd, they stand in the medians that they are found by: once more without those that are known.
@@ -63,13 +63,13 @@ pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
     if found.is_empty() || share(&cut) > MOST {
         return None;
     }
-    let mut knocks = Knocks { count: found.len(), first_s: f64::INFINITY, ..Knocks::default() };
+    let mut transients = Transients { count: found.len(), first_s: f64::INFINITY, ..Transients::default() };
     let sum = |of: fn(&Window) -> f64| found.iter().map(of).sum::<f64>();
-    knocks.ring_hz = 0.5 * sum(|w| w.crossings) / sum(|w| w.lasts_s).max(f64::MIN_POSITIVE);
+    transients.ring_hz = 0.5 * sum(|w| w.crossings) / sum(|w| w.lasts_s).max(f64::MIN_POSITIVE);
     for window in &found {
-        knocks.first_s = knocks.first_s.min(window.begin_s);
-        knocks.peak_rad = knocks.peak_rad.max(window.peak_rad);
-        knocks.mean_square_rad2 += window.square_rad2 / grid.samples;
+        transients.first_s = transients.first_s.min(window.begin_s);
+        transients.peak_rad = transients.peak_rad.max(window.peak_rad);
+        transients.mean_square_rad2 += window.square_rad2 / grid.samples;
         // They ring on under the scatter.
         let run = grid.places[window.places.start].run;
         let tail = window.places.end..window.places.end + window.places.len() / 2;
@@ -81,7 +81,7 @@ pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
         let mut place = places.iter();
         run.points.retain(|_| place.next().is_none_or(|p| !cut[*p]));
     }
-    Some(knocks)
+    Some(transients)
 }
 
 fn share(cut: &[bool]) -> f64 {
