@@ -4,6 +4,7 @@
 //! one huge effect does not hide small ones. A candidate's scale is averaged over a grid from 1 µrad to 1 mrad; the scales of
 //! a set are then moved to where its evidence is largest, each at the cost of having been free.
 
+use gearmodel::effect::Estimate;
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use super::design_matrix::{Block, DesignMatrix, RESIDUAL, WIDE, ZERO};
@@ -126,6 +127,20 @@ pub fn covariance(design: &DesignMatrix, whitened: &Whitened, fit: &Fit) -> DMat
     // What could be fitted can be solved.
     let solved = normal.solve(&prior(&design.blocks, &fit.set, &fit.scales_rad));
     solved.map_or_else(|| DMatrix::zeros(width, width), |solved| normal.covariance(&solved))
+}
+
+/// Amplitudes of block `n` of a fit in the effect's own units.
+#[must_use]
+pub(super) fn estimate(design: &DesignMatrix, whitened: &Whitened, fit: &Fit, n: usize) -> Estimate {
+    let block = &design.blocks[fit.set[n]];
+    let place = fit.place(design, n);
+    let mean = fit.mean.rows(place.start, place.len());
+    let covariance = covariance(design, whitened, fit);
+    let covariance = covariance.view((place.start, place.start), (place.len(), place.len()));
+    Estimate {
+        beta: (&block.transform * mean).iter().copied().collect(),
+        covariance: &block.transform * covariance * block.transform.transpose(),
+    }
 }
 
 /// Log evidence of a fit's set at its scales under another noise, whose matrix holds the residual and the fit's columns only.

@@ -9,9 +9,10 @@ use super::design_matrix::{Candidate, DesignMatrix};
 use super::diagnosis::{Curve, Location, Slice};
 use super::evidence::Fit;
 use super::grid::{Grid, nearest};
+use super::line_errors;
 use super::line_phase::LineError;
 use super::noise::Noise;
-use gearmodel::effect::{Accumulates, Carrier, INTERPOLATION, OperatingPoint, Parity, Rig, Signature, by_name};
+use gearmodel::effect::{Accumulates, Carrier, OperatingPoint, Parity, Rig, Signature};
 
 /// Sectors of a turn.
 const SECTORS: usize = 36;
@@ -152,7 +153,7 @@ fn signature(inputs: &Inputs<'_>) -> Signature {
     }
     for line in *lines {
         let size = line.explained_rad2 / grid.samples;
-        if let Some(effect) = by_name(INTERPOLATION[line.encoder])
+        if let Some(effect) = line_errors::effect_of(line.encoder)
             && largest.as_ref().is_none_or(|(s, _)| size > *s)
         {
             largest = Some((size, effect.signature()));

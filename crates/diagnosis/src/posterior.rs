@@ -1,6 +1,6 @@
 //! Posterior over models → probabilities of effects, groups and the unknown.
 
-use nalgebra::DMatrix;
+use nalgebra::{Cholesky, DMatrix};
 
 use super::design_matrix::ZERO;
 use super::design_matrix::{Block, Candidate, DesignMatrix};
@@ -14,6 +14,9 @@ pub const SAME_DEG: f64 = 2.0;
 const MEMBER_NATS: f64 = 6.0;
 /// Blocks this much wider than another describe more than it: not a group.
 const MUCH_WIDER: usize = 8;
+
+/// Ridge of the Gram matrix of a sum of two blocks.
+const SUM_RIDGE: f64 = 1e-10;
 
 /// Probabilities from all models seen.
 #[derive(Clone, Debug)]
@@ -64,24 +67,39 @@ pub fn posterior(design: &DesignMatrix, models: &[Model], sharpness: f64) -> Pos
     Posterior { probability, block, unknown, weights }
 }
 
-/// Largest principal angle between two blocks' subspaces, of the smaller one's directions, as the noise weighs them and with
-/// the zero free, deg.
+/// Largest principal angle between two blocks' subspaces, of the smaller one's directions, deg.
 #[must_use]
 pub fn angle_deg(design: &DesignMatrix, whitened: &Whitened, a: usize, b: usize) -> f64 {
-    let (a, b) = (&design.blocks[a], &design.blocks[b]);
+    let columns = |block: usize| design.blocks[block].columns.clone().collect::<Vec<_>>();
+    principal_angle_deg(whitened, &columns(a), &columns(b), 0.0)
+}
+
+/// Largest principal angle from a block to the sum of two others, deg.
+#[must_use]
+pub(super) fn angle_to_sum_deg(design: &DesignMatrix, whitened: &Whitened, target: usize, a: usize, b: usize) -> f64 {
+    let columns = |block: usize| design.blocks[block].columns.clone();
+    let sum: Vec<usize> = columns(a).chain(columns(b)).collect();
+    principal_angle_deg(whitened, &sum, &columns(target).collect::<Vec<_>>(), SUM_RIDGE)
+}
+
+/// Largest principal angle between the spans of columns, of the smaller one's directions, as the noise weighs them and with the zero
+/// free, deg; `ridge` is what the Gram matrix of `a`, whose columns may depend on one another, gets in parts of its largest entry.
+fn principal_angle_deg(whitened: &Whitened, a: &[usize], b: &[usize], ridge: f64) -> f64 {
     let g = &whitened.gram;
     let zero = g[(ZERO, ZERO)];
     let entry = |m: usize, n: usize| g[(m, n)] - g[(m, ZERO)] * g[(n, ZERO)] / zero;
-    let part = |rows: &std::ops::Range<usize>, columns: &std::ops::Range<usize>| {
-        DMatrix::from_fn(rows.len(), columns.len(), |m, n| entry(rows.start + m, columns.start + n))
+    let part = |rows: &[usize], columns: &[usize]| {
+        DMatrix::from_fn(rows.len(), columns.len(), |m, n| entry(rows[m], columns[n]))
     };
-    let half = |block: &Block| nalgebra::Cholesky::new(part(&block.columns, &block.columns)).map(|c| c.l());
-    let (Some(la), Some(lb)) = (half(a), half(b)) else { return 90.0 };
-    let cross = part(&a.columns, &b.columns);
-    let Some(left) = la.solve_lower_triangular(&cross) else { return 90.0 };
-    let Some(both) = lb.solve_lower_triangular(&left.transpose()) else { return 90.0 };
-    let cosines = both.singular_values();
-    let smallest = cosines.iter().copied().fold(1.0, f64::min);
+    let mut gram = part(a, a);
+    let ridge = ridge * gram.diagonal().max();
+    for n in 0..a.len() {
+        gram[(n, n)] += ridge;
+    }
+    let (Some(la), Some(lb)) = (Cholesky::new(gram), Cholesky::new(part(b, b))) else { return 90.0 };
+    let Some(left) = la.l().solve_lower_triangular(&part(a, b)) else { return 90.0 };
+    let Some(both) = lb.l().solve_lower_triangular(&left.transpose()) else { return 90.0 };
+    let smallest = both.singular_values().iter().copied().fold(1.0, f64::min);
     smallest.clamp(0.0, 1.0).acos().to_degrees()
 }
 

@@ -6,15 +6,15 @@ use super::{
     Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError,
 };
 
-/// Names by encoder: these effects are found on the samples, not on the places.
-pub const NAMES: [&str; 2] = ["encoder1_interpolation", "encoder2_interpolation"];
-
 /// Interpolation error of the input or output encoder.
 pub(super) struct EncoderInterpolation(pub(super) Shaft);
 
 impl Effect for EncoderInterpolation {
     fn name(&self) -> &'static str {
-        NAMES[usize::from(self.0 == Shaft::Output)]
+        match self.0 {
+            Shaft::Input => "encoder1_interpolation",
+            Shaft::Output => "encoder2_interpolation",
+        }
     }
 
     fn component(&self) -> &'static str {
@@ -30,6 +30,10 @@ impl Effect for EncoderInterpolation {
 
     fn applies(&self, _rig: &Rig) -> bool {
         true
+    }
+
+    fn within_lines_of(&self) -> Option<Shaft> {
+        Some(self.0)
     }
 
     /// None before the samples were searched for lines.

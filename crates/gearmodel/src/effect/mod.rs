@@ -51,8 +51,6 @@ pub use rig::{MeshOrders, Rig};
 pub use signature::{Accumulates, Carrier, Parity, Signature};
 pub use stated::{Given, Stated, StatedEffect, StatedError};
 
-pub use encoder_interpolation::NAMES as INTERPOLATION;
-
 use encoder_disc::{EncoderDisc, Order};
 
 /// Shaft that an effect sits on.
@@ -188,6 +186,11 @@ pub trait Effect: Sync {
         (&[], 0.0)
     }
 
+    /// Encoder within whose lines the trace lies: it is found on the samples, for means over angle do not show it.
+    fn within_lines_of(&self) -> Option<Shaft> {
+        None
+    }
+
     /// True where a shape is a list of times at which the level steps.
     fn steps(&self) -> bool {
         false
@@ -205,6 +208,11 @@ pub trait Effect: Sync {
 
     /// Parameters in the contract's names and units.
     fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter>;
+
+    /// The parameter that only follows from those found with the revolutions of a campaign.
+    fn over_a_campaign(&self, _found: &[Parameter], _revolutions: f64) -> Option<Parameter> {
+        None
+    }
 
     /// The documented error that this effect is a change of.
     fn folds_into(&self) -> Option<Fold> {
