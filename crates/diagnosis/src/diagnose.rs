@@ -16,7 +16,7 @@ use super::report::report;
 use super::runs::join;
 use super::solve::solve;
 use super::taken_off::TakenOff;
-use super::{events, interpolation, transients};
+use super::{interpolation, tones, transients};
 
 /// Fewest points of a diagnosis.
 const FEWEST_POINTS: usize = 60;
@@ -107,7 +107,7 @@ pub fn diagnose_runs(
     if transients.is_some() {
         grid = Grid::new(nominal.rig(), &runs);
     }
-    let (tones, grid) = events::take_off_tones(nominal.rig(), &mut runs, grid);
+    let (tones, grid) = tones::take_off(nominal.rig(), &mut runs, grid);
     let solution = solve(nominal.rig(), grid, TakenOff { lines, tones, transients }, options);
     report(&solution).ok_or(GapError::Singular)
 }

@@ -39,7 +39,6 @@ mod columns;
 mod cross_validation;
 mod diagnose;
 mod documented;
-mod events;
 mod experiment_design;
 mod ghosts;
 mod gram;
@@ -52,7 +51,9 @@ mod report;
 mod runs;
 mod sectors;
 mod solve;
+mod steps;
 mod taken_off;
+mod tones;
 mod transients;
 mod waves;
 

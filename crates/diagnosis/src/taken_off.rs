@@ -1,7 +1,7 @@
 //! What was taken off the points before anything was fitted.
 
-use super::events::Tone;
 use super::line_phase::LineError;
+use super::tones::Tone;
 use super::transients::Transients;
 
 /// Part of the knocks' RMS that may be left under the scatter where they ring on.
