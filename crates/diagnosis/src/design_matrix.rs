@@ -13,14 +13,13 @@ use super::columns::{Columns, Values};
 use super::gram;
 use super::grid::Grid;
 use super::nuisance_patterns::Pattern;
+use super::settings::{DesignSettings, EvidenceSettings, Settings};
 use super::waves::{WAVES, waves};
 use gearmodel::effect::{Effect, Grain, OperatingPoint, Rig, Rows, Shape};
 
 /// Column of the residual and of the zero in the design matrix.
 pub(super) const RESIDUAL: usize = 0;
 pub(super) const ZERO: usize = 1;
-/// Blocks wider than this are scanned on a coarser grid of scales: 2, 8, 32, 128 µrad.
-pub(super) const WIDE: usize = 16;
 
 /// What a block of columns stands for.
 #[derive(Clone)]
@@ -120,10 +119,12 @@ struct Base {
     weighted: Vec<DMatrix<f64>>,
     /// ZᵀWZ of every revolution.
     wave_products: Vec<DMatrix<f64>>,
+    own: DesignSettings,
+    evidence: EvidenceSettings,
 }
 
 impl Base {
-    fn new(grid: &Grid) -> Self {
+    fn new(grid: &Grid, settings: &Settings) -> Self {
         let mut cell_weight = vec![0.0; grid.cells.len()];
         for (cell, weight) in grid.cell_of.iter().zip(&grid.weight) {
             cell_weight[*cell] += weight;
@@ -141,7 +142,7 @@ impl Base {
                 (weighted, products)
             })
             .unzip();
-        Self { cell_weight, weighted, wave_products }
+        Self { cell_weight, weighted, wave_products, own: settings.design, evidence: settings.evidence }
     }
 }
 
@@ -196,19 +197,17 @@ fn values(unit: &DMatrix<f64>, evolves: bool, transform: DMatrix<f64>) -> (Vec<V
 
 /// Blocks made at a time.
 const BATCH: usize = 64;
-/// Traces smaller than this part of a block's largest direction are not seen under the plan.
-const UNSEEN: f64 = 1e-5;
 
 impl DesignMatrix {
     /// The residual and the zero, without blocks.
     #[must_use]
-    pub fn new(grid: &Grid) -> Self {
+    pub fn new(grid: &Grid, settings: &Settings) -> Self {
         let mut design = Self {
             blocks: Vec::new(),
             columns: Columns::default(),
             products: DMatrix::zeros(0, 0),
             waves: vec![DMatrix::zeros(WAVES, 0); grid.revolutions.len()],
-            base: Arc::new(Base::new(grid)),
+            base: Arc::new(Base::new(grid, settings)),
         };
         design.columns.push(grid, Values::Places(grid.rho_rad.clone()));
         design.columns.push(grid, Values::Cells(vec![1.0; grid.cells.len()]));
@@ -233,6 +232,12 @@ impl DesignMatrix {
             waves: self.waves.iter().map(|waves| waves.select_columns(&columns)).collect(),
             base: Arc::clone(&self.base),
         }
+    }
+
+    /// How the evidence of its blocks is weighed.
+    #[must_use]
+    pub(super) fn evidence(&self) -> &EvidenceSettings {
+        &self.base.evidence
     }
 
     /// Columns in all.
@@ -304,7 +309,7 @@ impl DesignMatrix {
         }
         // A column that is all zero beside the constant must not count through its rounding.
         let size = raw.amax();
-        if scale.max() < 1e-9 * size {
+        if scale.max() < self.base.own.constant * size {
             return None;
         }
         if matches!(candidate, Candidate::Unknown(pattern) if pattern.keeps_sizes()) {
@@ -312,8 +317,8 @@ impl DesignMatrix {
             return Some(values(&(raw * transform[(0, 0)]), evolves, transform));
         }
         let eigen = SymmetricEigen::new(covariance);
-        let largest = eigen.eigenvalues.max();
-        let kept: Vec<usize> = (0..width).filter(|n| eigen.eigenvalues[*n] > UNSEEN * UNSEEN * largest).collect();
+        let (largest, unseen) = (eigen.eigenvalues.max(), self.base.own.unseen);
+        let kept: Vec<usize> = (0..width).filter(|n| eigen.eigenvalues[*n] > unseen * unseen * largest).collect();
         let mut transform = DMatrix::zeros(width, kept.len());
         for (to, from) in kept.iter().enumerate() {
             let mut direction = eigen.eigenvectors.column(*from) / eigen.eigenvalues[*from].sqrt();

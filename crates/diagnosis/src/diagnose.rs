@@ -14,12 +14,10 @@ use super::options::{GapError, Options};
 use super::reduce::{ReducedRun, Reducer, Sample};
 use super::report::report;
 use super::runs::join;
+use super::settings::Settings;
 use super::solve::solve;
 use super::taken_off::TakenOff;
 use super::{interpolation, tones, transients};
-
-/// Fewest points of a diagnosis.
-const FEWEST_POINTS: usize = 60;
 
 /// Diagnoses recordings against a nominal model; recordings that reverse are split at their reversals, and all share one
 /// clock.
@@ -42,27 +40,29 @@ pub fn diagnose_with_nominal(
     if recordings.is_empty() {
         return Err(GapError::NoRecording);
     }
+    let settings = &options.settings;
     let lines = [0, 1].map(|encoder| {
         recordings
             .iter()
             .find_map(|r| if encoder == 0 { r.columns().input_lines } else { r.columns().output_lines })
             .map(|lines| lines as f64)
     });
-    let quantum = recordings.iter().find_map(|r| interpolation::counts_per_rev(&r.columns().theta2_rad));
+    let quantum =
+        recordings.iter().find_map(|r| interpolation::counts_per_rev(&r.columns().theta2_rad, &settings.lines));
     let mut nominal = Nominal::new(Rig::new(model.clone(), lines, quantum));
     let parts: Vec<Recording<'_>> = recordings.iter().flat_map(Recording::split).collect();
-    let lines = interpolation::search_lines(&parts, &nominal, lines);
+    let lines = interpolation::search_lines(&parts, &nominal, lines, &settings.lines);
     nominal.set_lines(lines);
-    let reduced = parts.par_iter().map(|part| reduce(part, &nominal)).collect();
+    let reduced = parts.par_iter().map(|part| reduce(part, &nominal, settings)).collect();
     let diagnosis = diagnose_runs(&nominal, reduced, options)?;
     Ok((diagnosis, nominal))
 }
 
 /// A recording as points.
-fn reduce(recording: &Recording<'_>, nominal: &Nominal) -> (ReducedRun, LinePhase) {
+fn reduce(recording: &Recording<'_>, nominal: &Nominal, settings: &Settings) -> (ReducedRun, LinePhase) {
     let columns = recording.columns();
     let direction = columns.direction.unwrap_or(Direction::Ccw);
-    let mut reducer = Reducer::new(nominal, direction, columns.speed_rpm.mean().abs());
+    let mut reducer = Reducer::new(nominal, direction, columns.speed_rpm.mean().abs(), settings);
     let load = columns.load_nm.mean();
     for n in 0..recording.samples() {
         reducer.push(Sample {
@@ -85,6 +85,7 @@ pub fn diagnose_runs(
     options: &Options,
 ) -> Result<Diagnosis, GapError> {
     options.check()?;
+    let settings = &options.settings;
     let recordings = reduced.len();
     let mut lines: Option<LinePhase> = None;
     let mut runs = Vec::new();
@@ -95,19 +96,19 @@ pub fn diagnose_runs(
         }
         runs.push(run);
     }
-    let mut runs = join(runs);
-    nominal.take_off_effects(&mut runs);
+    let mut runs = join(runs, &settings.reduction);
+    nominal.take_off_effects(&mut runs, &settings.reduction);
     let points = runs.iter().map(|run| run.points.len()).sum();
-    if points < FEWEST_POINTS {
-        return Err(GapError::TooShort { recordings, points, needed: FEWEST_POINTS });
+    if points < settings.reduction.fewest_points {
+        return Err(GapError::TooShort { recordings, points, needed: settings.reduction.fewest_points });
     }
     let lines = line_errors::take_off(&mut runs, lines.as_ref(), options);
-    let mut grid = Grid::new(nominal.rig(), &runs);
-    let transients = transients::take_off(&grid, &mut runs);
+    let mut grid = Grid::new(nominal.rig(), &runs, settings);
+    let transients = transients::take_off(&grid, &mut runs, &settings.transients);
     if transients.is_some() {
-        grid = Grid::new(nominal.rig(), &runs);
+        grid = Grid::new(nominal.rig(), &runs, settings);
     }
-    let (tones, grid) = tones::take_off(nominal.rig(), &mut runs, grid);
+    let (tones, grid) = tones::take_off(nominal.rig(), &mut runs, grid, settings);
     let solution = solve(nominal.rig(), grid, TakenOff { lines, tones, transients }, options);
     report(&solution).ok_or(GapError::Singular)
 }

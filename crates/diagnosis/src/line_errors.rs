@@ -5,9 +5,6 @@ use super::options::Options;
 use super::reduce::ReducedRun;
 use gearmodel::effect::{Effect, LIBRARY, Shaft};
 
-/// Log Bayes factor from which a sub-divisional error is taken off.
-const LINE_NATS: f64 = 4.0;
-
 /// Number of the encoder within whose lines an effect lies.
 pub(crate) fn encoder_of(effect: &dyn Effect) -> Option<usize> {
     effect.within_lines_of().map(|shaft| usize::from(shaft == Shaft::Output))
@@ -33,7 +30,7 @@ pub(crate) fn take_off(runs: &mut [ReducedRun], lines: Option<&LinePhase>, optio
             .filter(|(encoder, order)| !found.iter().any(|f| f.encoder == *encoder && f.order == *order))
             .filter_map(|(encoder, order)| left.pair(*encoder, *order))
             .max_by(|a, b| a.log_bayes_factor.total_cmp(&b.log_bayes_factor))
-            .filter(|error| error.log_bayes_factor > LINE_NATS)
+            .filter(|error| error.log_bayes_factor > options.settings.lines.taken_off_nats)
         {
             left.take_off(&error);
             found.push(error);

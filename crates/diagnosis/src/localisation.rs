@@ -8,14 +8,15 @@ use serde_json::json;
 use super::design_matrix::{Candidate, DesignMatrix};
 use super::diagnosis::{Curve, Location, Slice};
 use super::evidence::Fit;
-use super::grid::{Grid, nearest};
+use super::grid::Grid;
 use super::line_errors;
 use super::line_phase::LineError;
 use super::noise::Noise;
-use gearmodel::effect::{Accumulates, Carrier, OperatingPoint, Parity, Rig, Signature};
+use super::settings::Settings;
+use gearmodel::effect::{Accumulates, Carrier, OperatingPoint, Parity, Rig, Signature, nearest_level};
 
 /// Sectors of a turn.
-const SECTORS: usize = 36;
+const LOCATION_SECTORS: usize = 36;
 /// Orders of a shaft.
 const ORDERS: usize = 12;
 /// Orders of the mesh.
@@ -40,8 +41,9 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
     let rest: Vec<f64> = grid.rho_rad.iter().map(|y| y - zero).collect();
     let by =
         |key: &dyn Fn(&OperatingPoint) -> Option<usize>, names: &[serde_json::Value]| slices(inputs, &rest, key, names);
-    let sectors: Vec<_> = (0..SECTORS).map(|n| json!((n as f64 + 0.5) * 360.0 / SECTORS as f64)).collect();
-    let sector = |angle_rad: f64| ((angle_rad / TAU).rem_euclid(1.0) * SECTORS as f64) as usize;
+    let sectors: Vec<_> =
+        (0..LOCATION_SECTORS).map(|n| json!((n as f64 + 0.5) * 360.0 / LOCATION_SECTORS as f64)).collect();
+    let sector = |angle_rad: f64| ((angle_rad / TAU).rem_euclid(1.0) * LOCATION_SECTORS as f64) as usize;
     let teeth = rig.pair().teeth().0 as usize;
     let tooth_names: Vec<_> = (0..teeth).map(|n| json!(n)).collect();
     let loads: Vec<_> = grid.plan.loads_nm.iter().map(|x| json!(x)).collect();
@@ -86,8 +88,8 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
             })
             .collect(),
         direction: by(&|at| Some(usize::from(at.sense < 0.0)), &[json!("ccw"), json!("cw")]),
-        load: by(&|at| Some(nearest(&grid.plan.loads_nm, at.load_nm)), &loads),
-        speed: by(&|at| Some(nearest(&grid.plan.speeds_rad_per_s, at.speed_rad_per_s.abs())), &speeds),
+        load: by(&|at| Some(nearest_level(&grid.plan.loads_nm, at.load_nm)), &loads),
+        speed: by(&|at| Some(nearest_level(&grid.plan.speeds_rad_per_s, at.speed_rad_per_s.abs())), &speeds),
         revolution: by(&|at| Some(at.way_rev as usize), &(0..revolutions).map(|n| json!(n)).collect::<Vec<_>>()),
         time: by(&|at| Some(time(at)), &times),
     }
@@ -174,7 +176,7 @@ fn signature(inputs: &Inputs<'_>) -> Signature {
 }
 
 /// What this data does not allow one to conclude.
-pub(super) fn warnings(grid: &Grid, noise: &Noise) -> Vec<String> {
+pub(super) fn warnings(grid: &Grid, noise: &Noise, settings: &Settings) -> Vec<String> {
     let plan = &grid.plan;
     let mut warnings = Vec::new();
     if plan.senses != [true, true] {
@@ -204,12 +206,12 @@ pub(super) fn warnings(grid: &Grid, noise: &Noise) -> Vec<String> {
              record at least 3 revolutions a run"
                 .to_owned(),
         );
-    } else if noise.freedom < 40.0 {
+    } else if noise.freedom < settings.report.few_differences {
         warnings.push(
             "few revolutions were recorded: repeatability is known roughly, and so are the probabilities".to_owned(),
         );
     }
-    if grid.revolutions.iter().all(|r| r.coverage < 0.9) {
+    if grid.revolutions.iter().all(|r| r.coverage < settings.noise.full_coverage) {
         warnings.push("no revolution is complete: orders of the shafts cannot be told apart well".to_owned());
     }
     warnings

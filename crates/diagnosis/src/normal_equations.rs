@@ -5,8 +5,11 @@ use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
-use super::design_matrix::{Block, RESIDUAL, WIDE};
+use super::design_matrix::{Block, RESIDUAL};
 use super::noise::Whitened;
+
+/// Blocks of more columns than this are worth turning.
+const TURNED: usize = 16;
 
 /// Normal equations of a set, the columns of its widest block turned to where their part is diagonal: they then cost no more than a
 /// diagonal does, however often the scales are moved.
@@ -60,7 +63,7 @@ impl NormalEquations {
 
     /// Of a set with these columns.
     pub(super) fn new(blocks: &[Block], whitened: &Whitened, set: &[usize], columns: &[usize]) -> Self {
-        let widest = set.iter().map(|b| &blocks[*b]).filter(|b| b.width() > WIDE).max_by_key(|b| b.width());
+        let widest = set.iter().map(|b| &blocks[*b]).filter(|b| b.width() > TURNED).max_by_key(|b| b.width());
         let Some(block) = widest else {
             let (gram, rhs) = select(&whitened.gram, columns);
             return Self::dense(gram, rhs);

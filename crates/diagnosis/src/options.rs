@@ -1,5 +1,6 @@
 //! What a person may say before the data is looked at, and why there is no diagnosis.
 
+use super::settings::Settings;
 use gearmodel::effect::{Effect, LIBRARY, by_name};
 
 /// What may be said before the data is looked at.
@@ -9,6 +10,8 @@ pub struct Options {
     pub known: Vec<String>,
     /// Effects that are not.
     pub exclude: Vec<String>,
+    /// Every number that can change the verdict.
+    pub settings: Settings,
 }
 
 /// Why there is no diagnosis.

@@ -6,14 +6,8 @@ use super::design_matrix::ZERO;
 use super::design_matrix::{Block, Candidate, DesignMatrix};
 use super::noise::Whitened;
 use super::search::Model;
+use super::settings::ReportSettings;
 use gearmodel::effect::LIBRARY;
-
-/// Subspaces nearer than this cannot be told apart, deg.
-pub const SAME_DEG: f64 = 2.0;
-/// Members of a group may be this much less probable than the best, nats.
-const MEMBER_NATS: f64 = 6.0;
-/// Blocks this much wider than another describe more than it: not a group.
-const MUCH_WIDER: usize = 8;
 
 /// Ridge of the Gram matrix of a sum of two blocks.
 const SUM_RIDGE: f64 = 1e-10;
@@ -103,7 +97,7 @@ fn principal_angle_deg(whitened: &Whitened, a: &[usize], b: &[usize], ridge: f64
     smallest.clamp(0.0, 1.0).acos().to_degrees()
 }
 
-/// Effects that stand under [`SAME_DEG`] from `effect` in this plan and fit the data about as well: their places in the library
+/// Effects that cannot be told from `effect` in this plan and fit the data about as well: their places in the library
 /// with the angle, the effect itself not included.
 #[must_use]
 pub fn confusable(
@@ -113,21 +107,25 @@ pub fn confusable(
     effect: usize,
     swapped_score: &mut dyn FnMut(usize) -> Option<f64>,
     best_score: f64,
+    settings: &ReportSettings,
 ) -> Vec<(usize, f64)> {
     let Some(own) = posterior.block[effect] else { return Vec::new() };
     let own_width = design.blocks[own].width();
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
     for (b, block) in design.blocks.iter().enumerate() {
         let Some(n) = number(block) else { continue };
-        if n == effect || block.width() * MUCH_WIDER < own_width || own_width * MUCH_WIDER < block.width() {
+        if n == effect
+            || block.width() * settings.much_wider < own_width
+            || own_width * settings.much_wider < block.width()
+        {
             continue;
         }
         let angle = angle_deg(design, whitened, own, b);
-        if angle >= SAME_DEG {
+        if angle >= settings.same_deg {
             continue;
         }
         let Some(score) = swapped_score(b) else { continue };
-        if score < best_score - MEMBER_NATS {
+        if score < best_score - settings.member_nats {
             continue;
         }
         match found.iter_mut().find(|(m, ..)| *m == n) {

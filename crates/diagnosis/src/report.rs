@@ -21,15 +21,12 @@ use super::posterior::posterior;
 use super::solve::Solution;
 use context::Context;
 use findings::Finding;
-use verdict::{NAMED, Named};
-
-/// Under 1 it flattens what the noise model's own error makes too sure; calibrated on simulated campaigns.
-const SHARPNESS: f64 = 1.0;
+use verdict::Named;
 
 /// The diagnosis that a solution amounts to; `None` where no model could be fitted.
 pub(crate) fn report(solution: &Solution<'_>) -> Option<Diagnosis> {
     let context = Context::new(solution)?;
-    let posterior = posterior(context.design, &solution.models, SHARPNESS);
+    let posterior = posterior(context.design, &solution.models, context.settings.report.sharpness);
     let findings = findings::findings(&context, &posterior, &mut solution.search());
     let measured = held_out::measure(&context, &findings);
     let findings = held_out::with_shrink(&context, &measured, findings);
@@ -39,13 +36,13 @@ pub(crate) fn report(solution: &Solution<'_>) -> Option<Diagnosis> {
         verdict::named(&context, &findings, &solution.models, &posterior.weights);
     let findings = by_probability(verdict::shared_alike(findings, &identical));
     let unknown = unknown::unknown(&context, &posterior, measured.gap.floor_rad);
-    if unknown.probability > NAMED {
+    if unknown.probability > context.settings.report.named {
         verdict.push(Verdict::Name("unknown".to_owned()));
     }
 
     let mut gap = measured.gap;
     gap.budget = budget::budget(&context, measured.reducible_rad2);
-    let mut warnings = localisation::warnings(context.grid, context.noise);
+    let mut warnings = localisation::warnings(context.grid, context.noise, context.settings);
     warnings.extend(mimics::warnings(&context, &findings, &verdict));
     let next = experiment_design::experiments(context.grid, &still_open(&findings, &groups), &unknown, &warnings);
     Some(Diagnosis {
@@ -67,6 +64,7 @@ pub(crate) fn report(solution: &Solution<'_>) -> Option<Diagnosis> {
         found: found(&context, &findings, &verdict),
         curves: localisation::curves(context.grid, context.design, &context.best.fit),
         verdict,
+        settings: *context.settings,
     })
 }
 

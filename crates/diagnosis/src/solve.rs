@@ -18,15 +18,11 @@ use state::State;
 
 pub(crate) use state::Solution;
 
-/// Rounds of: search, look for events, sharpen shapes, estimate the noise anew.
-const ROUNDS: usize = 3;
-/// Change of the floor's log from which another round is worth it.
-const MOVED: f64 = 0.03;
-
 /// The models that a residual allows, with the noise and the design matrix that they were weighed in.
 pub(crate) fn solve<'a>(rig: &'a Rig, grid: Grid, taken_off: TakenOff, options: &'a Options) -> Solution<'a> {
+    let settings = &options.settings.search;
     let mut state = State::new(rig, grid, taken_off, options);
-    for round in 0..ROUNDS {
+    for round in 0..settings.rounds {
         state.search();
         let changed = sharpen::sharpen(&mut state)
             | steps::look_for_steps(&mut state)
@@ -35,7 +31,7 @@ pub(crate) fn solve<'a>(rig: &'a Rig, grid: Grid, taken_off: TakenOff, options: 
         let before = state.noise.floor_rad2();
         run_ratio::estimate_noise(&mut state);
         let moved = (state.noise.floor_rad2() / before).ln().abs();
-        if round > 0 && !changed && moved < MOVED {
+        if round > 0 && !changed && moved < settings.floor_moved {
             break;
         }
     }

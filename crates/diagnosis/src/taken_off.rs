@@ -1,11 +1,9 @@
 //! What was taken off the points before anything was fitted.
 
 use super::line_phase::LineError;
+use super::settings::TransientSettings;
 use super::tones::Tone;
 use super::transients::Transients;
-
-/// Part of the knocks' RMS that may be left under the scatter where they ring on.
-const TAILS: f64 = 0.12;
 
 /// What was taken off the points before anything was fitted.
 pub(crate) struct TakenOff {
@@ -34,8 +32,8 @@ impl TakenOff {
     }
 
     /// RMS below which nothing is told from the tails of the knocks, rad.
-    pub(crate) fn least_rad(&self) -> f64 {
-        self.transients.map_or(0.0, |transients| TAILS * transients.mean_square_rad2.sqrt())
+    pub(crate) fn least_rad(&self, settings: &TransientSettings) -> f64 {
+        self.transients.map_or(0.0, |transients| settings.tails * transients.mean_square_rad2.sqrt())
     }
 
     /// True where nothing was taken off.

@@ -8,21 +8,12 @@ use std::f64::consts::TAU;
 
 use super::grid::Grid;
 use super::reduce::{Point, ReducedRun};
+use super::settings::{Settings, ToneSettings};
 use super::waves::{WAVES, waves};
 use gearmodel::effect::Rig;
 
 /// Frequencies of the search for tones.
 const TONE_STEPS: usize = 1 << 17;
-/// Log odds from which a tone is taken into the design matrix.
-const TONE_NATS: f64 = 6.0;
-/// The same below a few turns' frequency, where the scatter is not white.
-const LOW_TONE_NATS: f64 = 60.0;
-/// Most tones taken off.
-const MOST_TONES: usize = 3;
-/// Neighbours on either side that a tone must stand out of.
-const NEIGHBOURS: usize = 100;
-/// Part of the scatter that a tone must make.
-const LEAST_TONE_SHARE: f64 = 0.002;
 
 /// A tone in time.
 #[derive(Clone, Copy, Debug)]
@@ -35,15 +26,16 @@ pub struct Tone {
 
 /// Finds tones in what differs between revolutions of a condition, and takes them off the points. With them the grid of what is
 /// left.
-pub fn take_off(rig: &Rig, runs: &mut [ReducedRun], mut grid: Grid) -> (Vec<Tone>, Grid) {
+pub fn take_off(rig: &Rig, runs: &mut [ReducedRun], mut grid: Grid, settings: &Settings) -> (Vec<Tone>, Grid) {
+    let own = &settings.tones;
     let mut tones = Vec::new();
     for band in [Band::High, Band::Low] {
-        while tones.len() < MOST_TONES
-            && let Some(frequency_hz) = strongest_tone(&grid, runs, band)
-            && let Some(tone) = take_off_tone(runs, &grid, frequency_hz, band)
+        while tones.len() < own.most
+            && let Some(frequency_hz) = strongest_tone(&grid, runs, band, own)
+            && let Some(tone) = take_off_tone(runs, &grid, frequency_hz, band, own)
         {
             tones.push(tone);
-            grid = Grid::new(rig, runs);
+            grid = Grid::new(rig, runs, settings);
         }
     }
     (tones, grid)
@@ -59,17 +51,17 @@ enum Band {
 
 impl Band {
     /// Its limits in turns' frequencies.
-    fn turns(self) -> [f64; 2] {
+    fn turns(self, settings: &ToneSettings) -> [f64; 2] {
         match self {
-            Self::High => [10.0, f64::INFINITY],
-            Self::Low => [2.0, 10.0],
+            Self::High => [settings.high_turns, f64::INFINITY],
+            Self::Low => [settings.low_turns, settings.high_turns],
         }
     }
 
-    fn least_nats(self) -> f64 {
+    fn least_nats(self, settings: &ToneSettings) -> f64 {
         match self {
-            Self::High => TONE_NATS,
-            Self::Low => LOW_TONE_NATS,
+            Self::High => settings.high_nats,
+            Self::Low => settings.low_nats,
         }
     }
 }
@@ -87,7 +79,7 @@ fn detrended(grid: &Grid, runs: &[ReducedRun], band: Band, value: &dyn Fn(&Point
     each().map(|(point, place)| value(point) - means[*place] + residual[*place]).collect()
 }
 
-fn strongest_tone(grid: &Grid, runs: &[ReducedRun], band: Band) -> Option<f64> {
+fn strongest_tone(grid: &Grid, runs: &[ReducedRun], band: Band, settings: &ToneSettings) -> Option<f64> {
     let duration_s = grid.plan.duration_s;
     if grid.revolutions.len() < 2 || duration_s <= 0.0 {
         return None;
@@ -106,24 +98,31 @@ fn strongest_tone(grid: &Grid, runs: &[ReducedRun], band: Band) -> Option<f64> {
     // Above half the points' rate all is mirrored.
     let turn_hz = grid.plan.speeds_rad_per_s.last().copied().unwrap_or(0.0) / TAU;
     let bins_per_hz = 2.0 * duration_s;
-    let [low, high] = band.turns().map(|turns| turns * turn_hz * bins_per_hz);
-    let first = low.ceil().max(2.0 * NEIGHBOURS as f64) as usize;
+    let [low, high] = band.turns(settings).map(|turns| turns * turn_hz * bins_per_hz);
+    let first = low.ceil().max(2.0 * settings.neighbours as f64) as usize;
     let mut gaps_s: Vec<f64> = points.windows(2).map(|w| w[1].time_s - w[0].time_s).collect();
     gaps_s.sort_by(f64::total_cmp);
     let gap_s = gaps_s.get(gaps_s.len() / 2).copied()?;
-    let last = ((0.45 / gap_s * bins_per_hz).min(high) as usize).min(TONE_STEPS - 2 * NEIGHBOURS);
+    let last =
+        ((settings.highest_of_rate / gap_s * bins_per_hz).min(high) as usize).min(TONE_STEPS - 2 * settings.neighbours);
     let size: Vec<f64> = series[..TONE_STEPS].iter().map(|x| x.norm_sqr() / power).collect();
     let peak = (first..last).max_by(|a, b| size[*a].total_cmp(&size[*b]))?;
     // A tone is a line: it stands out of its neighbours too, which the broad spectrum of a step or a knock does not.
-    let about = size[peak - NEIGHBOURS..peak - 4].iter().chain(&size[peak + 5..peak + NEIGHBOURS]);
-    let level = about.sum::<f64>() / (2 * NEIGHBOURS - 9) as f64;
+    let about = size[peak - settings.neighbours..peak - 4].iter().chain(&size[peak + 5..peak + settings.neighbours]);
+    let level = about.sum::<f64>() / (2 * settings.neighbours - 9) as f64;
     let level = if band == Band::High { level.max(1.0) } else { level };
     let nats = size[peak] / level - (points.len() as f64).ln();
-    (nats > band.least_nats()).then_some(peak as f64 / bins_per_hz)
+    (nats > band.least_nats(settings)).then_some(peak as f64 / bins_per_hz)
 }
 
 /// Refines the frequency, fits the tone and subtracts it; `None` where it is too small to matter.
-fn take_off_tone(runs: &mut [ReducedRun], grid: &Grid, frequency_hz: f64, band: Band) -> Option<Tone> {
+fn take_off_tone(
+    runs: &mut [ReducedRun],
+    grid: &Grid,
+    frequency_hz: f64,
+    band: Band,
+    settings: &ToneSettings,
+) -> Option<Tone> {
     let values = detrended(grid, runs, band, &|point| point.rho_rad);
     let points: Vec<Point> = runs.iter().flat_map(|run| &run.points).copied().collect();
     let start_s = points.first()?.time_s;
@@ -160,7 +159,7 @@ fn take_off_tone(runs: &mut [ReducedRun], grid: &Grid, frequency_hz: f64, band: 
         square += point.samples * value * value;
     }
     let beta = normal.try_inverse()? * right;
-    if right.dot(&beta) < LEAST_TONE_SHARE * square {
+    if right.dot(&beta) < settings.least_share * square {
         return None;
     }
     for point in runs.iter_mut().flat_map(|run| &mut run.points) {

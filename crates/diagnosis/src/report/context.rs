@@ -7,6 +7,7 @@ use crate::evidence;
 use crate::grid::Grid;
 use crate::noise::{Noise, Whitened};
 use crate::search::Model;
+use crate::settings::Settings;
 use crate::solve::Solution;
 use crate::taken_off::TakenOff;
 
@@ -19,13 +20,14 @@ pub(super) struct Context<'a> {
     pub(super) whitened: &'a Whitened,
     pub(super) taken_off: &'a TakenOff,
     pub(super) best: &'a Model,
+    pub(super) settings: &'a Settings,
 }
 
 impl<'a> Context<'a> {
     /// `None` where no model could be fitted.
     pub(super) fn new(solution: &'a Solution<'a>) -> Option<Self> {
-        let Solution { rig, grid, design, noise, whitened, taken_off, models, .. } = solution;
-        Some(Self { rig, grid, design, noise, whitened, taken_off, best: models.first()? })
+        let Solution { rig, grid, design, noise, whitened, taken_off, models, options } = solution;
+        Some(Self { rig, grid, design, noise, whitened, taken_off, best: models.first()?, settings: &options.settings })
     }
 
     /// Amplitudes of block `n` of a model in the effect's own units.

@@ -7,15 +7,8 @@ use super::context::Context;
 use crate::design_matrix::Candidate;
 use crate::evidence;
 use crate::line_errors;
-use crate::posterior::{Posterior, SAME_DEG, angle_deg, confusable};
+use crate::posterior::{Posterior, angle_deg, confusable};
 use crate::search::{Model, Search};
-
-/// Prior odds of a sub-divisional error.
-const LINE_ODDS: f64 = 0.04;
-/// Probability from which effects that cannot be told from one are looked for.
-const WORTH_COMPARING: f64 = 0.02;
-/// An effect that is not in the best model has no better reference than this much under it, nats.
-const REFERENCE_NATS: f64 = 3.0;
 
 /// What is known of one effect.
 pub(super) struct Finding {
@@ -63,6 +56,7 @@ fn finding(
     empty: Option<&Model>,
     number: usize,
 ) -> Option<Finding> {
+    let settings = &context.settings.report;
     let (design, whitened, best) = (context.design, context.whitened, context.best);
     let own: Vec<usize> = (0..design.blocks.len())
         .filter(|b| matches!(&design.blocks[*b].candidate, Candidate::Effect { number: n, .. } if *n == number))
@@ -74,8 +68,9 @@ fn finding(
     })?;
     // The block of the best model that this one would stand in for: itself, or one with the same trace.
     let set = || best.fit.set.iter().copied();
-    let stands_for =
-        set().find(|b| *b == block).or_else(|| set().find(|b| angle_deg(design, whitened, *b, block) < SAME_DEG));
+    let stands_for = set()
+        .find(|b| *b == block)
+        .or_else(|| set().find(|b| angle_deg(design, whitened, *b, block) < settings.same_deg));
     let in_best = stands_for == Some(block);
     let mut model_with = |out: Option<usize>, b: usize| {
         let mut set: Vec<usize> = set().filter(|x| Some(*x) != out).collect();
@@ -84,14 +79,15 @@ fn finding(
     };
     let reference =
         if in_best { Some(best.score) } else { stands_for.and_then(|b| model_with(Some(b), block)).map(|m| m.score) };
-    let confusable = match reference.filter(|_| posterior.probability[number] > WORTH_COMPARING) {
+    let confusable = match reference.filter(|_| posterior.probability[number] > settings.compared) {
         Some(reference) => confusable(
             design,
             whitened,
             posterior,
             number,
             &mut |b| model_with(stands_for, b).map(|m| m.score),
-            reference.max(best.score - REFERENCE_NATS),
+            reference.max(best.score - settings.reference_nats),
+            settings,
         ),
         None => Vec::new(),
     };
@@ -123,7 +119,7 @@ fn finding(
 fn line_finding(context: &Context<'_>, number: usize, encoder: usize) -> Finding {
     let own = || context.taken_off.lines.iter().filter(|l| l.encoder == encoder);
     let strongest = own().max_by(|a, b| a.log_bayes_factor.total_cmp(&b.log_bayes_factor));
-    let odds = strongest.map_or(f64::NEG_INFINITY, |l| l.log_bayes_factor + LINE_ODDS.ln());
+    let odds = strongest.map_or(f64::NEG_INFINITY, |l| l.log_bayes_factor + context.settings.search.effect_odds.ln());
     let rms_rad = own().map(|l| l.explained_rad2 / context.grid.samples).sum::<f64>().max(0.0).sqrt();
     Finding {
         number,

@@ -2,13 +2,9 @@
 
 use super::context::Context;
 use super::findings::Finding;
-use super::verdict::NAMED;
 use crate::cross_validation::{self, Errors, HeldOut, Selection};
 use crate::diagnosis::Gap;
 use crate::search::Model;
-
-/// Least scale at which an effect alone is refitted, rad.
-const LEAST_ALONE_RAD: f64 = 1e-6;
 
 /// The gap as measured on what was left out.
 pub(super) struct Measured {
@@ -39,7 +35,15 @@ pub(super) fn measure(context: &Context<'_>, findings: &[Finding]) -> Measured {
     let explained_rad2 = context.lines_rad2() + taken_off.events_rad2();
     // What the place's own samples scatter, less what the lines explain of it.
     let within_rad2 = grid.within_rad2 / grid.samples;
-    let gap = cross_validation::gap(&before, &after, floor_rad2, within_rad2, explained_rad2, found);
+    let gap = cross_validation::gap(
+        &before,
+        &after,
+        floor_rad2,
+        within_rad2,
+        explained_rad2,
+        found,
+        context.settings.report.resamples,
+    );
     let reducible_rad2 = before.mean() + explained_rad2 - floor_rad2;
     Measured { held_out, before, after, gap, explained_rad2, reducible_rad2 }
 }
@@ -65,14 +69,16 @@ pub(super) fn with_shrink(context: &Context<'_>, measured: &Measured, mut findin
             Some(block) if reducible > 0.0 => {
                 let block = &context.design.blocks[block];
                 let d = block.width() as f64;
-                let scale = finding.rms_rad.max(LEAST_ALONE_RAD);
+                let scale = finding.rms_rad.max(context.settings.evidence.smallest_scale_rad);
                 let alone = measured.held_out.errors(&Selection {
                     columns: block.columns.clone().collect(),
                     prior_rad2: vec![scale * scale / d; d as usize],
                 });
                 Some((measured.before.mean() - alone.mean()) / reducible)
             }
-            None if finding.probability > NAMED && reducible > 0.0 => Some(measured.explained_rad2 / reducible),
+            None if finding.probability > context.settings.report.named && reducible > 0.0 => {
+                Some(measured.explained_rad2 / reducible)
+            }
             _ => None,
         };
     }

@@ -5,12 +5,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::context::Context;
 use super::findings::Finding;
-
-/// Standard deviations are this much larger than under the noise model alone, whose own error they do not know; calibrated on
-/// simulated campaigns.
-const WIDER: f64 = 1.25;
-/// How exact parameters are at best, in parts of their value, and phases in rad.
-const LINEARISED: f64 = 0.006;
+use crate::settings::ReportSettings;
 
 /// All parameters of a finding; none where it was not fitted.
 pub(super) fn parameters(context: &Context<'_>, finding: &Finding) -> Map<String, Json> {
@@ -20,10 +15,10 @@ pub(super) fn parameters(context: &Context<'_>, finding: &Finding) -> Map<String
     let revolutions = context.grid.plan.revolutions.max(f64::MIN_POSITIVE);
     let over_the_campaign = effect.over_a_campaign(&found, revolutions);
     found.extend(over_the_campaign);
-    found.iter().map(|parameter| (parameter.name.to_owned(), entry(parameter))).collect()
+    found.iter().map(|parameter| (parameter.name.to_owned(), entry(parameter, &context.settings.report))).collect()
 }
 
-fn entry(parameter: &Parameter) -> Json {
+fn entry(parameter: &Parameter, settings: &ReportSettings) -> Json {
     let value = match &parameter.value {
         Value::Number(x) => json!(x),
         Value::Table(values) => json!(values),
@@ -33,8 +28,9 @@ fn entry(parameter: &Parameter) -> Json {
     let std = match (&parameter.value, parameter.std) {
         (Value::Number(x), Some(std)) => {
             // A phase has no size of its own.
-            let inexact = if parameter.name.starts_with("ph") { LINEARISED } else { LINEARISED * x.abs() };
-            Some(if std > 0.0 { (WIDER * std).hypot(inexact) } else { std })
+            let inexact =
+                if parameter.name.starts_with("ph") { settings.linearised } else { settings.linearised * x.abs() };
+            Some(if std > 0.0 { (settings.wider * std).hypot(inexact) } else { std })
         }
         (_, std) => std,
     };

@@ -5,32 +5,22 @@ use gearmodel::effect::LIBRARY;
 use super::context::Context;
 use super::findings::Finding;
 use super::held_out::{Measured, selection};
-use super::verdict::NAMED;
 use crate::design_matrix::Candidate;
-
-/// An effect or a remainder under this part of what was found may be the found effects' own inexactness; under this part of the
-/// floor, the nominal and the noise model's.
-const INEXACT: f64 = 0.05;
-const INEXACT_OF_FLOOR: f64 = 0.08;
-/// The same of a resonance: how it is excited is known less well than geometry is.
-const INEXACT_RINGING: f64 = 0.08;
-/// Largest probability of what may be no more than that.
-pub(super) const INEXACT_PROBABILITY: f64 = 0.02;
-/// Largest probability of steps that make the prediction of held-out runs worse.
-const UNPREDICTIVE_PROBABILITY: f64 = 0.3;
+use crate::settings::ReportSettings;
 
 /// Smallest RMS worth naming beside what was found and what does not repeat.
-pub(super) fn least_rad(found_rad2: f64, rings_rad2: f64, floor_rad: f64) -> f64 {
-    let part = (INEXACT * found_rad2.sqrt()).max(INEXACT_RINGING * rings_rad2.sqrt());
-    part.max(INEXACT_OF_FLOOR * floor_rad)
+pub(super) fn least_rad(found_rad2: f64, rings_rad2: f64, floor_rad: f64, settings: &ReportSettings) -> f64 {
+    let part = (settings.inexact * found_rad2.sqrt()).max(settings.inexact_ringing * rings_rad2.sqrt());
+    part.max(settings.inexact_of_floor * floor_rad)
 }
 
 /// The findings, none more probable than its size and its predictions allow.
 pub(super) fn limited(context: &Context<'_>, measured: &Measured, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let settings = &context.settings.report;
     let (design, best) = (context.design, context.best);
     let total_rad2 = findings
         .iter()
-        .filter(|f| f.probability > NAMED && f.block.is_some_and(|b| best.fit.set.contains(&b)))
+        .filter(|f| f.probability > settings.named && f.block.is_some_and(|b| best.fit.set.contains(&b)))
         .map(|f| f.rms_rad * f.rms_rad)
         .sum::<f64>();
     // What is too small to matter beside what was found, or beside what does not repeat.
@@ -39,10 +29,10 @@ pub(super) fn limited(context: &Context<'_>, measured: &Measured, mut findings: 
         .map(|n| best.fit.rms_rad(design, n).powi(2))
         .sum();
     let found_rad2 = total_rad2 + unknown_rad2 + measured.explained_rad2;
-    let least_rad = least_rad(found_rad2, context.rings_rad2(), measured.gap.floor_rad);
+    let least_rad = least_rad(found_rad2, context.rings_rad2(), measured.gap.floor_rad, settings);
     let left: Vec<(&[&str], f64)> = findings
         .iter()
-        .filter(|f| f.probability > NAMED)
+        .filter(|f| f.probability > settings.named)
         .map(|f| (LIBRARY[f.number].leaves(), f.rms_rad))
         .map(|((names, part), rms_rad)| (names, part * rms_rad))
         .collect();
@@ -51,9 +41,9 @@ pub(super) fn limited(context: &Context<'_>, measured: &Measured, mut findings: 
         let left_rad = left.iter().filter(|(names, _)| names.contains(&name)).map(|(_, rad)| *rad);
         let least_rad = left_rad.fold(least_rad, f64::max);
         if finding.rms_rad < least_rad {
-            finding.most = INEXACT_PROBABILITY;
+            finding.most = settings.inexact_probability;
         } else if LIBRARY[finding.number].steps() && !predicts(context, measured, finding) {
-            finding.most = UNPREDICTIVE_PROBABILITY;
+            finding.most = settings.unpredictive_probability;
         }
         finding.probability = finding.probability.min(finding.most);
     }

@@ -3,50 +3,41 @@
 use gearmodel::effect::{Carrier, Parity, Signature};
 
 use super::context::Context;
-use super::plausibility::{INEXACT_PROBABILITY, least_rad};
+use super::plausibility::least_rad;
 use crate::design_matrix::Candidate;
 use crate::diagnosis::{Unknown, UnknownLocation};
 use crate::nuisance_patterns::Pattern;
 use crate::posterior::Posterior;
 use crate::transients::Transients;
 
-/// Probability of a tone that was found over all frequencies, and of knocks far out of the scatter.
-const EVENT_PROBABILITY: f64 = 0.99;
-/// Knocks ring at a resonance's own frequency where both are no further apart than a factor of e to this.
-const SAME_RING: f64 = 0.3;
-/// A wandering level under this part of the floor may be scatter; so may one that steps between runs.
-const WANDERS_OF_FLOOR: f64 = 0.8;
-const STEPS_OF_FLOOR: f64 = 0.4;
-/// Probability from which it is said where it lies.
-const LOCATED: f64 = 0.1;
-
 /// The unknown with its probability, its size and where it lies.
 pub(super) fn unknown(context: &Context<'_>, posterior: &Posterior, floor_rad: f64) -> Unknown {
+    let settings = &context.settings.report;
     let parts = Parts::of(context);
     let transients = foreign_transients(context);
     let taken_off = context.taken_off;
     let square = parts.unknown_rad2 + (taken_off.tones_rad2() + transients.map_or(0.0, |t| t.mean_square_rad2));
     let rms_rad = square.sqrt();
-    let least_rad = least_rad(parts.effects_rad2.max(context.lines_rad2()), context.rings_rad2(), floor_rad);
+    let least_rad = least_rad(parts.effects_rad2.max(context.lines_rad2()), context.rings_rad2(), floor_rad, settings);
     if let Some(transients) = transients.filter(|transients| transients.mean_square_rad2.sqrt() > least_rad) {
         let signature = Signature::steady(Carrier::None, Parity::Mixed);
         let location = Some(UnknownLocation { description: describe(transients), signature });
-        return Unknown { probability: EVENT_PROBABILITY, rms_rad, location };
+        return Unknown { probability: settings.event_probability, rms_rad, location };
     }
     if let Some(tone) = taken_off.tones.first().filter(|tone| tone.amplitude_rad > least_rad) {
         let location = Some(locate(&Pattern::Tone { frequency_hz: tone.frequency_hz }));
-        return Unknown { probability: EVENT_PROBABILITY, rms_rad, location };
+        return Unknown { probability: settings.event_probability, rms_rad, location };
     }
     // Effects are linearised and their shapes lie on grids: a small part of them may stay behind. Scatter wanders too.
     let of_floor = match parts.strongest {
-        Some(Pattern::RandomWalk { .. }) => WANDERS_OF_FLOOR,
-        Some(Pattern::Step { .. }) => STEPS_OF_FLOOR,
+        Some(Pattern::RandomWalk { .. }) => settings.wanders_of_floor,
+        Some(Pattern::Step { .. }) => settings.steps_of_floor,
         _ => 0.0,
     };
     let least_rad = least_rad.max(of_floor * floor_rad);
     let inexact = square > 0.0 && rms_rad < least_rad;
-    let probability = if inexact { posterior.unknown.min(INEXACT_PROBABILITY) } else { posterior.unknown };
-    let location = parts.strongest.filter(|_| probability > LOCATED).map(locate);
+    let probability = if inexact { posterior.unknown.min(settings.inexact_probability) } else { posterior.unknown };
+    let location = parts.strongest.filter(|_| probability > settings.located).map(locate);
     Unknown { probability: probability.min(1.0), rms_rad, location }
 }
 
@@ -89,7 +80,9 @@ fn foreign_transients<'a>(context: &Context<'a>) -> Option<&'a Transients> {
     let slowest_hz = grid.plan.speeds_rad_per_s.first().map_or(0.0, |speed| speed / std::f64::consts::TAU);
     let shown_hz = 0.5 * grid.bins as f64 * slowest_hz;
     let own = |transients: &&Transients| {
-        context.rings_hz().any(|(_, hz)| hz > shown_hz || (transients.ring_hz / hz).ln().abs() < SAME_RING)
+        context
+            .rings_hz()
+            .any(|(_, hz)| hz > shown_hz || (transients.ring_hz / hz).ln().abs() < context.settings.report.same_ring)
     };
     context.taken_off.transients.as_ref().filter(|transients| !own(transients))
 }

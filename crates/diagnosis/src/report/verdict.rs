@@ -8,13 +8,6 @@ use crate::design_matrix::Candidate;
 use crate::diagnosis::{Group, Verdict};
 use crate::search::Model;
 
-/// Probability from which an effect is named.
-pub(super) const NAMED: f64 = 0.5;
-/// Least probability of a group that is told.
-const TOLD: f64 = 0.02;
-/// Members of a group nearer than this have one and the same trace, deg.
-const IDENTICAL_DEG: f64 = 0.2;
-
 /// What is named, and groups whose members have one and the same trace with the probability that one of them is there.
 pub(super) struct Named {
     pub(super) groups: Vec<Group>,
@@ -24,6 +17,7 @@ pub(super) struct Named {
 
 /// Groups and what is named, from findings with the most probable first; `weights` are those of the models.
 pub(super) fn named(context: &Context<'_>, findings: &[Finding], models: &[Model], weights: &[f64]) -> Named {
+    let settings = &context.settings.report;
     let mut named = Named { groups: Vec::new(), verdict: Vec::new(), identical: Vec::new() };
     let mut done: Vec<usize> = Vec::new();
     for finding in findings {
@@ -42,20 +36,20 @@ pub(super) fn named(context: &Context<'_>, findings: &[Finding], models: &[Model
         let probability = probability.min(finding.most);
         let in_best = finding.block.is_none() || holds_one_of(context, context.best, &members);
         if members.len() > 1 {
-            if probability < TOLD {
+            if probability < settings.compared {
                 continue;
             }
             let angle_deg = finding.confusable.iter().map(|(_, a)| *a).fold(0.0, f64::max);
             let names: Vec<String> = members.iter().map(|n| LIBRARY[*n].name().to_owned()).collect();
-            if angle_deg < IDENTICAL_DEG {
+            if angle_deg < settings.identical_deg {
                 named.identical.push((members.clone(), probability));
             }
             named.groups.push(Group { members: names.clone(), angle_deg, probability });
             done.extend(&members);
-            if probability > NAMED && in_best {
+            if probability > settings.named && in_best {
                 named.verdict.push(Verdict::Group { members: names, angle_deg });
             }
-        } else if probability > NAMED && in_best {
+        } else if probability > settings.named && in_best {
             done.push(finding.number);
             named.verdict.push(Verdict::Name(finding.name().to_owned()));
         }

@@ -4,25 +4,28 @@ use super::state::State;
 use crate::design_matrix::{DesignMatrix, RESIDUAL};
 use crate::evidence::{self, Fit};
 use crate::grid::Grid;
-use crate::noise::{FIRST_RUN_RATIO, Noise};
-
-/// Ratios of the scatter between runs to that between revolutions that are weighed against one another.
-const RUN_RATIOS: [f64; 6] = [0.02, 0.08, 0.3, 1.0, 3.0, 10.0];
-/// How far such a ratio usually is from what it is first taken to be: a factor of e to this.
-const RUN_RATIO_SPREAD: f64 = 1.5;
+use crate::noise::Noise;
+use crate::settings::NoiseSettings;
 
 /// Estimates the noise that the best model leaves.
 pub(super) fn estimate_noise(state: &mut State<'_>) {
     let ratio = state.noise.run_ratio;
-    state.noise = Noise::estimate(&state.grid, &state.design, &state.amplitudes());
+    state.noise = Noise::estimate(&state.grid, &state.design, &state.amplitudes(), &state.settings().noise);
     state.noise.run_ratio = ratio;
     if let Some(best) = &state.best {
-        state.noise.run_ratio = best_run_ratio(&state.grid, &state.noise, &state.design, &best.fit);
+        state.noise.run_ratio =
+            best_run_ratio(&state.grid, &state.noise, &state.design, &best.fit, &state.settings().noise);
     }
 }
 
 /// The scatter between runs that a fit leaves, weighed on a grid.
-pub(super) fn best_run_ratio(grid: &Grid, noise: &Noise, design: &DesignMatrix, fit: &Fit) -> [f64; 2] {
+pub(super) fn best_run_ratio(
+    grid: &Grid,
+    noise: &Noise,
+    design: &DesignMatrix,
+    fit: &Fit,
+    settings: &NoiseSettings,
+) -> [f64; 2] {
     if grid.plan.runs < 2 {
         return noise.run_ratio;
     }
@@ -30,14 +33,14 @@ pub(super) fn best_run_ratio(grid: &Grid, noise: &Noise, design: &DesignMatrix, 
     columns.extend(&fit.columns);
     let mut chosen = (f64::NEG_INFINITY, noise.run_ratio);
     let within = noise.within_runs(grid, design, Some(&columns));
-    for level in RUN_RATIOS {
-        for waves in RUN_RATIOS {
+    for level in settings.run_ratios {
+        for waves in settings.run_ratios {
             let ratio = [level, waves];
             let whitened = within.between_runs(ratio);
             let log_prior: f64 = ratio
                 .iter()
-                .zip(FIRST_RUN_RATIO)
-                .map(|(ratio, usual)| -0.5 * ((ratio / usual).ln() / RUN_RATIO_SPREAD).powi(2))
+                .zip(settings.first_run_ratio)
+                .map(|(ratio, usual)| -0.5 * ((ratio / usual).ln() / settings.run_ratio_spread).powi(2))
                 .sum();
             let score = evidence::at_scales(design, &whitened, fit) + log_prior;
             if score > chosen.0 {

@@ -6,33 +6,25 @@ use super::state::State;
 use crate::design_matrix::{Candidate, DesignMatrix};
 use crate::evidence;
 
-/// Blocks smaller than this part of the largest are left out while its shape is moved.
-const LARGE: f64 = 0.12;
-/// Steps in which shapes are moved, in parts of their grid's.
-const SHARPENING_STEPS: [f64; 6] = [1.0, 0.6, 0.3, 0.15, 0.07, 0.03];
-/// Step under which shapes that no longer move are sharp enough.
-const SHARP_ENOUGH: f64 = 0.2;
-/// What a moved shape must gain, nats: a fifth of its standard deviation.
-const SHARPER_NATS: f64 = 0.02;
-
 /// Moves the shapes of the best model's larger effects to where they fit best, the small ones left out. Then both sets compete.
 /// Works in a design matrix of its own, which stays small. True where any shape moved.
 pub(super) fn sharpen(state: &mut State<'_>) -> bool {
+    let settings = &state.settings().sharpening;
     let Some(best) = &state.best else { return false };
     let largest = (0..best.fit.set.len()).map(|n| best.fit.rms_rad(&state.design, n)).fold(0.0, f64::max);
     let large: Vec<usize> = (0..best.fit.set.len())
-        .filter(|n| best.fit.rms_rad(&state.design, *n) > LARGE * largest)
+        .filter(|n| best.fit.rms_rad(&state.design, *n) > settings.large * largest)
         .map(|n| best.fit.set[n])
         .collect();
     let mut few = state.design.only(&state.grid, &large);
     let mut changed = false;
-    for step in SHARPENING_STEPS {
+    for step in settings.steps {
         let mut moved = false;
         for _ in 0..large.len() {
             moved |= sharpen_first(state, &mut few, step);
         }
         changed |= moved;
-        if !moved && step < SHARP_ENOUGH {
+        if !moved && step < settings.sharp_enough {
             break;
         }
     }
@@ -59,7 +51,7 @@ fn sharpen_first(state: &State<'_>, few: &mut DesignMatrix, step: f64) -> bool {
             shapes.map(|shape| Candidate::Effect { effect, number, shape, cost_nats }).collect()
         }
         Candidate::Unknown(pattern) => {
-            let nearer = pattern.nearer(step, state.grid.span_rev());
+            let nearer = pattern.nearer(step, state.grid.span_rev(), state.settings());
             nearer.into_iter().map(Candidate::Unknown).collect()
         }
     };
@@ -74,7 +66,7 @@ fn sharpen_first(state: &State<'_>, few: &mut DesignMatrix, step: f64) -> bool {
             Some((fit.log_evidence, tried))
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .filter(|(log_evidence, _)| *log_evidence > now.log_evidence + SHARPER_NATS);
+        .filter(|(log_evidence, _)| *log_evidence > now.log_evidence + state.settings().sharpening.least_gain_nats);
     let moved = best.is_some();
     *few = best.map_or_else(|| few.only(&state.grid, &[&all[1..], &all[..1]].concat()), |(_, tried)| tried);
     moved

@@ -10,10 +10,8 @@ use crate::noise::{Noise, Whitened};
 use crate::nuisance_patterns::Pattern;
 use crate::options::Options;
 use crate::search::{Allowed, Model, Search};
+use crate::settings::Settings;
 use crate::taken_off::TakenOff;
-
-/// What a choice among shapes costs, in parts of the log of their number: neighbouring shapes are alike and count as fewer.
-const SHAPE_COST: f64 = 0.8;
 
 /// The state of a diagnosis under way.
 pub(super) struct State<'a> {
@@ -52,23 +50,29 @@ pub(crate) struct Solution<'a> {
 impl<'a> State<'a> {
     /// All candidates that the rig and the plan allow; nothing found yet.
     pub(super) fn new(rig: &'a Rig, grid: Grid, taken_off: TakenOff, options: &'a Options) -> Self {
-        let mut design = DesignMatrix::new(&grid);
+        let settings = &options.settings;
+        let mut design = DesignMatrix::new(&grid, settings);
         let mut candidates = Vec::new();
         for (number, effect) in LIBRARY.iter().copied().enumerate() {
             if !effect.applies(rig) || options.excludes(effect) {
                 continue;
             }
             let shapes = effect.shapes(rig, &grid.plan);
-            let cost_nats = SHAPE_COST * (shapes.len().max(1) as f64).ln();
+            let cost_nats = settings.search.shape_cost * (shapes.len().max(1) as f64).ln();
             candidates.extend(shapes.into_iter().map(|shape| Candidate::Effect { effect, number, shape, cost_nats }));
         }
-        candidates.extend(Pattern::all(&grid.plan).into_iter().map(Candidate::Unknown));
+        candidates.extend(Pattern::all(&grid.plan, &settings.nuisance).into_iter().map(Candidate::Unknown));
         design.add(&grid, rig, &candidates);
-        let noise = Noise::estimate(&grid, &design, &[]);
-        let ghosts = ghosts::find(&grid, &noise, &grid.rho_rad);
+        let noise = Noise::estimate(&grid, &design, &[], &settings.noise);
+        let ghosts = ghosts::find(&grid, &noise, &grid.rho_rad, settings);
         design.add(&grid, rig, &ghosts.into_iter().map(Candidate::Unknown).collect::<Vec<_>>());
         let whitened = Whitened::empty();
         Self { rig, options, taken_off, grid, design, noise, whitened, best: None, large: None }
+    }
+
+    /// Every number that may be chosen.
+    pub(super) fn settings(&self) -> &'a Settings {
+        &self.options.settings
     }
 
     /// Searches under the present noise, from nothing and from the last best model.
@@ -99,7 +103,8 @@ impl<'a> State<'a> {
 
     /// A search in a design matrix under one noise, with what is known and what was cut out.
     pub(super) fn search_in<'b>(&self, design: &'b DesignMatrix, whitened: &'b Whitened) -> Search<'b> {
-        Search::new(design, whitened, &self.options.known, self.taken_off.least_rad())
+        let settings = &self.options.settings;
+        Search::new(design, whitened, &self.options.known, self.taken_off.least_rad(&settings.transients), settings)
     }
 
     /// Block of the design matrix with the same candidate.
@@ -141,7 +146,9 @@ impl<'a> State<'a> {
 impl Solution<'_> {
     /// A search under the noise found, with what is known and what was cut out.
     pub(crate) fn search(&self) -> Search<'_> {
-        Search::new(&self.design, &self.whitened, &self.options.known, self.taken_off.least_rad())
+        let settings = &self.options.settings;
+        let least_rad = self.taken_off.least_rad(&settings.transients);
+        Search::new(&self.design, &self.whitened, &self.options.known, least_rad, settings)
     }
 }
 

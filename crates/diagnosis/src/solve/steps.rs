@@ -7,20 +7,18 @@ use super::weigh::{add_and_weigh, beside};
 use crate::design_matrix::Candidate;
 use crate::{evidence, steps};
 
-/// Most steps looked for between runs.
-const MOST_BETWEEN: usize = 4;
-
 /// Looks for steps, and takes what is found into the design matrix.
 pub(super) fn look_for_steps(state: &mut State<'_>) -> bool {
+    let settings = &state.settings().steps;
     let amplitudes = state.amplitudes();
     let steady = state.steady_amplitudes();
-    let found = steps::find(&state.grid, &state.design, &state.noise, &amplitudes, &steady);
+    let found = steps::find(&state.grid, &state.design, &state.noise, &amplitudes, &steady, settings);
     let mut candidates = Vec::new();
     candidates.extend(found.patterns.into_iter().map(Candidate::Unknown));
     let stepping = LIBRARY.iter().copied().enumerate().find(|(_, e)| e.steps() && !state.options.excludes(*e));
     if let Some((number, effect)) = stepping {
         let with_times = |times_s: Shape| {
-            let cost_nats = steps::steps_cost_nats(times_s.len());
+            let cost_nats = steps::steps_cost_nats(times_s.len(), settings);
             Candidate::Effect { effect, number, shape: times_s, cost_nats }
         };
         candidates.extend(found.times_s.into_iter().map(with_times));
@@ -35,6 +33,7 @@ pub(super) fn look_for_steps(state: &mut State<'_>) -> bool {
 /// The steps of the best model and those between runs that were taken for levels of theirs: as they are, and each moved to where it
 /// fits best.
 fn steps_between_runs(state: &State<'_>, with_times: &dyn Fn(Shape) -> Candidate) -> Option<[Shape; 3]> {
+    let settings = &state.settings().steps;
     let fit = &state.best.as_ref()?.fit;
     let (times_s, size_rad) = (0..fit.set.len()).find_map(|n| match &state.design.blocks[fit.set[n]].candidate {
         Candidate::Effect { effect, shape, .. } if effect.steps() && shape.len() > 1 => {
@@ -55,7 +54,7 @@ fn steps_between_runs(state: &State<'_>, with_times: &dyn Fn(Shape) -> Candidate
     let amplitudes: Vec<(usize, f64)> = others.iter().flat_map(stays).map(|n| (fit.columns[n], fit.mean[n])).collect();
     let rest = state.design.rest(&state.grid, &amplitudes);
     // Of the size in the model, and of their own: what else is in the model may have taken a part of it.
-    let settled = |size_rad| steps::settle(&state.grid, &state.noise, &rest, &times_s, size_rad);
+    let settled = |size_rad| steps::settle(&state.grid, &state.noise, &rest, &times_s, size_rad, settings);
     let (as_found, of_their_own) = (settled(Some(size_rad)), settled(None));
     Some([times_s, as_found, of_their_own])
 }
@@ -67,8 +66,10 @@ fn with_steps_between(
     mut times_s: Shape,
     with_times: &dyn Fn(Shape) -> Candidate,
 ) -> Option<Shape> {
+    let settings = &state.settings().steps;
+    let cost_nats = |times_s: &[f64]| steps::steps_cost_nats(times_s.len(), settings);
     let mut before = f64::NEG_INFINITY;
-    for _ in 0..MOST_BETWEEN {
+    for _ in 0..settings.most_between {
         let with = |more: Option<&f64>| {
             let mut shape: Vec<f64> = times_s.iter().chain(more).copied().collect();
             shape.sort_by(f64::total_cmp);
@@ -78,7 +79,7 @@ fn with_steps_between(
         let beside = beside(state, others, &tried.collect::<Vec<_>>())?;
         let (best, gain) = beside.best()?;
         let Candidate::Effect { shape, .. } = &beside.design.blocks[best].candidate else { return None };
-        let cost_nats = steps::steps_cost_nats(shape.len()) - steps::steps_cost_nats(times_s.len());
+        let cost_nats = cost_nats(shape) - cost_nats(&times_s);
         if gain < before + cost_nats || *shape == times_s {
             break;
         }

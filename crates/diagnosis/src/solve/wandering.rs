@@ -5,19 +5,15 @@ use super::weigh::{add_and_weigh, beside};
 use crate::design_matrix::Candidate;
 use crate::nuisance_patterns::Pattern;
 
-/// Evidence from which a wave that does not close with the turn is taken into the design matrix, nats.
-const WANDERING_NATS: f64 = 8.0;
-/// Times that such waves are looked for: on the grid of orders, then ever nearer about the best.
-const PASSES: usize = 3;
-
 /// Looks for such waves in a design matrix of their own, and takes the best into that of all where it is worth it.
 pub(super) fn look_for_wandering_waves(state: &mut State<'_>) -> bool {
+    let settings = state.settings();
     let span_rev = state.grid.span_rev();
-    let mut patterns = Pattern::wandering(span_rev);
+    let mut patterns = Pattern::wandering(span_rev, &settings.nuisance);
     let mut step = 1.0;
     let found = state.best.as_ref().map(|m| m.fit.set.clone()).unwrap_or_default();
     let mut best: Option<(Pattern, f64)> = None;
-    for _ in 0..PASSES {
+    for _ in 0..settings.nuisance.wandering_passes {
         let tried: Vec<Candidate> = patterns.iter().cloned().map(Candidate::Unknown).collect();
         let Some(beside) = beside(state, &found, &tried) else { return false };
         for (block, gain) in &beside.gains {
@@ -27,8 +23,10 @@ pub(super) fn look_for_wandering_waves(state: &mut State<'_>) -> bool {
                 best = Some((pattern.clone(), *gain));
             }
         }
-        let Some((pattern, _)) = best.as_ref().filter(|(_, gain)| *gain > WANDERING_NATS) else { return false };
-        patterns = pattern.nearer(step, span_rev);
+        let Some((pattern, _)) = best.as_ref().filter(|(_, gain)| *gain > settings.nuisance.wandering_nats) else {
+            return false;
+        };
+        patterns = pattern.nearer(step, span_rev, settings);
         step *= 0.5;
     }
     let Some((pattern, _)) = best else { return false };

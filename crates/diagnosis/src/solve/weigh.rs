@@ -7,13 +7,6 @@ use crate::evidence;
 use crate::noise::Noise;
 use crate::search::Allowed;
 
-/// Part of the scatter's square from which it is not worth being fitted under once more.
-const QUIETER: f64 = 0.9;
-/// A set with an event that alone scores so much less than the best is not searched about, nats.
-const NEAR_NATS: f64 = 30.0;
-/// The same where the best model has nothing that the event could stand in for: it must be better by itself, nats.
-const NEARER_NATS: f64 = 0.0;
-
 /// Candidates in a design matrix of their own, with what each would add to the set that stands there.
 pub(super) struct Beside {
     pub(super) design: DesignMatrix,
@@ -52,6 +45,7 @@ pub(super) fn add_and_weigh(state: &mut State<'_>, events: &[Candidate]) -> bool
 /// Steps and tones pass for scatter until they are taken off: the noise that one leaves beside what does not move the level, where
 /// that alone comes near the best model.
 pub(super) fn noise_with(state: &State<'_>, event: &Candidate, rounds: usize) -> Option<Noise> {
+    let settings = state.settings();
     let steady = state.steady_set();
     let best = state.best.as_ref()?;
     // In a design matrix of its own: most events that are none fail here.
@@ -64,15 +58,19 @@ pub(super) fn noise_with(state: &State<'_>, event: &Candidate, rounds: usize) ->
         let before = noise.floor_rad2();
         let fit = evidence::fit(&few, &noise.whiten(&state.grid, &few), &own, &[])?;
         let run_ratio = noise.run_ratio;
-        noise = Noise::estimate(&state.grid, &few, &fit.amplitudes());
+        noise = Noise::estimate(&state.grid, &few, &fit.amplitudes(), &settings.noise);
         noise.run_ratio = run_ratio;
-        noise.run_ratio = best_run_ratio(&state.grid, &noise, &few, &fit);
-        if noise.floor_rad2() > QUIETER * before {
+        noise.run_ratio = best_run_ratio(&state.grid, &noise, &few, &fit, &settings.noise);
+        if noise.floor_rad2() > settings.running_on.quieter * before {
             break;
         }
     }
     let alone = state.search_in(&few, &noise.whiten(&state.grid, &few)).model(own, None)?;
-    let room = if steady.len() < best.fit.set.len() { NEAR_NATS } else { NEARER_NATS };
+    let room = if steady.len() < best.fit.set.len() {
+        settings.search.event_near_nats
+    } else {
+        settings.search.event_alone_nats
+    };
     (alone.score > best.score - room).then_some(noise)
 }
 

@@ -1,7 +1,6 @@
 //! Where a step stands: its sharp edge.
 
 use crate::grid::Grid;
-use crate::sectors::SECTORS;
 
 /// Where among weighted values a step of a given size stands best: the first value that it raises.
 pub(super) fn edge(values: impl Iterator<Item = (f64, f64)> + Clone, step_rad: f64) -> usize {
@@ -23,10 +22,10 @@ pub(super) fn edge(values: impl Iterator<Item = (f64, f64)> + Clone, step_rad: f
 
 /// Moves each step to where the places about it say: a step has a sharp edge, and one that lies off by a sector fits worse
 /// than none.
-pub(super) fn sharpen(grid: &Grid, rest: &[f64], times_s: &[f64], size_rad: f64) -> Vec<f64> {
+pub(super) fn sharpen(grid: &Grid, rest: &[f64], times_s: &[f64], size_rad: f64, sectors: usize) -> Vec<f64> {
     let mut order: Vec<usize> = (0..grid.places.len()).collect();
     order.sort_by(|a, b| grid.places[*a].time_s.total_cmp(&grid.places[*b].time_s));
-    let half = grid.bins / SECTORS * 3 / 2;
+    let half = grid.bins / sectors * 3 / 2;
     let mut found: Vec<f64> = times_s
         .iter()
         .enumerate()

@@ -3,41 +3,29 @@
 
 use rayon::prelude::*;
 
-use crate::sectors::{SECTORS, Sector};
+use crate::sectors::Sector;
+use crate::settings::StepSettings;
 
-/// What a step costs on the way through the sectors, nats: its place is open.
-const STEP_NATS: f64 = 4.0;
-/// What steps cost as an effect, nats: to look for them, and each, whose place was chosen to a fraction of a degree.
-const STEPS_COST_NATS: [f64; 2] = [8.0, 6.5];
-/// Evidence from which steps are taken into the design matrix, nats.
-const STEPS_FOUND_NATS: f64 = 8.0;
 /// Most steps followed, and most from one sector to the next.
 const MOST_STEPS: usize = 96;
 const PAD: usize = 2;
-/// Step sizes tried: 1.5 µrad to 1.2 mrad.
-const SIZES: usize = 30;
-const SMALLEST_RAD: f64 = 1.5e-6;
-/// Ratio of neighbouring sizes.
-const SIZE_RATIO: f64 = 1.26;
-/// Most steps that a rise is shared out to.
-const MOST_SHARED: u32 = 32;
 
 /// What so many steps cost as an effect, nats: which of the places came first does not matter.
-pub(crate) fn steps_cost_nats(steps: usize) -> f64 {
+pub(crate) fn steps_cost_nats(steps: usize, settings: &StepSettings) -> f64 {
     let orders: f64 = (1..=steps).map(|n| (n as f64).ln()).sum();
-    STEPS_COST_NATS[0] + STEPS_COST_NATS[1] * steps as f64 - orders
+    settings.looked_for_nats + settings.each_nats * steps as f64 - orders
 }
 
 /// Times of steps of one size and the size, where they are worth their cost; at most two such sets.
-pub(super) fn find_steps(sectors: &[Sector], tied: bool) -> Vec<(Vec<f64>, f64)> {
+pub(super) fn find_steps(sectors: &[Sector], tied: bool, settings: &StepSettings) -> Vec<(Vec<f64>, f64)> {
     let flat = level_cost(sectors, tied, &vec![0; sectors.len()], 0.0).0;
     let followed = |size_rad: f64| {
         let mut size_rad = size_rad;
-        let mut levels = initial_levels(sectors, tied);
+        let mut levels = initial_levels(sectors, tied, settings.sectors);
         let mut counts = Vec::new();
         let mut cost = f64::INFINITY;
         for _ in 0..3 {
-            let next = follow(sectors, tied, &levels, size_rad);
+            let next = follow(sectors, tied, &levels, size_rad, settings);
             // The same steps have the same levels and size: nothing would move any more.
             if next == counts {
                 break;
@@ -50,15 +38,15 @@ pub(super) fn find_steps(sectors: &[Sector], tied: bool) -> Vec<(Vec<f64>, f64)>
             }
         }
         let steps = steps_in(sectors, tied, &counts);
-        (steps > 0).then_some((flat - cost - STEP_NATS * steps as f64, counts))
+        (steps > 0).then_some((flat - cost - settings.step_nats * steps as f64, counts))
     };
-    let sizes = (0..SIZES as i32).map(|n| SMALLEST_RAD * SIZE_RATIO.powi(n));
+    let sizes = (0..settings.sizes).map(|n| settings.smallest_rad * settings.size_ratio.powi(n));
     let sizes: Vec<f64> = sizes.flat_map(|size_rad| [size_rad, -size_rad]).collect();
     let mut tried: Vec<(f64, Vec<usize>)> = sizes.into_par_iter().filter_map(followed).collect();
     // How far they rise together is known well then; by a step of the grid too large the same way takes one step fewer.
     if let Some((_, counts)) = tried.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
         let rise_rad = level_cost_with_size(sectors, tied, counts).2 * steps_in(sectors, tied, counts) as f64;
-        let shared: Vec<f64> = (1..=MOST_SHARED).map(|steps| rise_rad / f64::from(steps)).collect();
+        let shared: Vec<f64> = (1..=settings.most_shared).map(|steps| rise_rad / f64::from(steps)).collect();
         tried.extend(shared.into_par_iter().filter_map(followed).collect::<Vec<_>>());
     }
     // Many small steps and fewer large ones come near each other here, where all cost the same: the first by what they cost as an
@@ -66,9 +54,9 @@ pub(super) fn find_steps(sectors: &[Sector], tied: bool) -> Vec<(Vec<f64>, f64)>
     let by_score = |a: &&(f64, Vec<usize>), b: &&(f64, Vec<usize>)| a.0.total_cmp(&b.0);
     let as_effect = |(score, counts): &(f64, Vec<usize>)| {
         let steps = steps_in(sectors, tied, counts);
-        score + STEP_NATS * steps as f64 - steps_cost_nats(steps)
+        score + settings.step_nats * steps as f64 - steps_cost_nats(steps, settings)
     };
-    let best = tried.iter().max_by(by_score).filter(|(score, _)| *score > STEPS_FOUND_NATS);
+    let best = tried.iter().max_by(by_score).filter(|(score, _)| *score > settings.found_nats);
     let other = best.and_then(|_| tried.iter().max_by(|a, b| as_effect(a).total_cmp(&as_effect(b))));
     let mut counts: Vec<&Vec<usize>> = best.into_iter().chain(other).map(|(_, counts)| counts).collect();
     counts.dedup();
@@ -94,13 +82,13 @@ fn steps_in(sectors: &[Sector], tied: bool, counts: &[usize]) -> usize {
 }
 
 /// Levels before any step: the median of the first revolution of each run, or of the campaign.
-fn initial_levels(sectors: &[Sector], tied: bool) -> Vec<f64> {
+fn initial_levels(sectors: &[Sector], tied: bool, per_revolution: usize) -> Vec<f64> {
     let runs = sectors.iter().map(|s| s.run).max().map_or(0, |n| n + 1);
     (0..runs)
         .map(|run| {
             let from = if tied { 0 } else { run };
             let mut first: Vec<f64> =
-                sectors.iter().filter(|s| s.run == from).take(SECTORS / 2).map(|s| s.mean_rad).collect();
+                sectors.iter().filter(|s| s.run == from).take(per_revolution / 2).map(|s| s.mean_rad).collect();
             first.sort_by(f64::total_cmp);
             first.get(first.len() / 2).copied().unwrap_or(0.0)
         })
@@ -108,7 +96,7 @@ fn initial_levels(sectors: &[Sector], tied: bool) -> Vec<f64> {
 }
 
 /// Number of steps so far at each sector, by dynamic programming.
-fn follow(sectors: &[Sector], tied: bool, levels: &[f64], size_rad: f64) -> Vec<usize> {
+fn follow(sectors: &[Sector], tied: bool, levels: &[f64], size_rad: f64, settings: &StepSettings) -> Vec<usize> {
     let fresh = |n: usize| n == 0 || (!tied && sectors[n].run != sectors[n - 1].run);
     // Least costs of k steps before each sector, then after the last. Two places stand before k = 0, so that no jump needs a
     // look at where it comes from.
@@ -123,10 +111,10 @@ fn follow(sectors: &[Sector], tied: bool, levels: &[f64], size_rad: f64) -> Vec<
         }
         let (done, open) = costs.split_at_mut(n + 1);
         let (before, after) = (&done[n], &mut open[0]);
-        let jumps = if fresh(n) { 0.0 } else { STEP_NATS };
+        let jumps = if fresh(n) { 0.0 } else { settings.step_nats };
         let (first, weight) = (sector.mean_rad - levels[sector.run], 0.5 / sector.variance_rad2);
         for k in 0..MOST_STEPS {
-            let least = if jumps > 0.0 { cheapest(before, k).0 } else { before[k + PAD] };
+            let least = if jumps > 0.0 { cheapest(before, k, settings.step_nats).0 } else { before[k + PAD] };
             let deviation = first - size_rad * k as f64;
             after[k + PAD] = least + weight * deviation * deviation;
         }
@@ -138,20 +126,20 @@ fn follow(sectors: &[Sector], tied: bool, levels: &[f64], size_rad: f64) -> Vec<
         counts[n] = k;
         if fresh(n) {
             if n > 0 {
-                k = run_end(sectors, levels, size_rad, n - 1);
+                k = run_end(sectors, levels, size_rad, n - 1, settings.sectors);
             }
         } else {
-            k -= cheapest(&costs[n], k).1;
+            k -= cheapest(&costs[n], k, settings.step_nats).1;
         }
     }
     counts
 }
 
 /// Cost of the cheapest way to k steps by a jump of none, one or two, and that jump.
-fn cheapest(before: &[f64; PAD + MOST_STEPS], k: usize) -> (f64, usize) {
+fn cheapest(before: &[f64; PAD + MOST_STEPS], k: usize, step_nats: f64) -> (f64, usize) {
     let mut best = (before[k + PAD], 0);
     for jump in 1..=PAD {
-        let cost = before[k + PAD - jump] + STEP_NATS * jump as f64;
+        let cost = before[k + PAD - jump] + step_nats * jump as f64;
         if cost < best.0 {
             best = (cost, jump);
         }
@@ -164,9 +152,10 @@ fn argmin(values: &[f64]) -> usize {
 }
 
 /// The state in which the run that ends with sector `last` most likely ends.
-fn run_end(sectors: &[Sector], levels: &[f64], size_rad: f64, last: usize) -> usize {
+fn run_end(sectors: &[Sector], levels: &[f64], size_rad: f64, last: usize, per_revolution: usize) -> usize {
     let run = sectors[last].run;
-    let tail: Vec<&Sector> = sectors[..=last].iter().rev().take_while(|s| s.run == run).take(SECTORS / 3).collect();
+    let tail: Vec<&Sector> =
+        sectors[..=last].iter().rev().take_while(|s| s.run == run).take(per_revolution / 3).collect();
     let mean = tail.iter().map(|s| s.mean_rad - levels[run]).sum::<f64>() / tail.len().max(1) as f64;
     ((mean / size_rad).round().max(0.0) as usize).min(MOST_STEPS - 1)
 }

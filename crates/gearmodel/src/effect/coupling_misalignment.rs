@@ -2,7 +2,9 @@
 //! In the output shaft the encoder reads θ2 + (β²/4) sin(2θ2 − φ); in the input shaft gear 1 stands at θ1 + (β²/4) sin(2θ1 − φ),
 //! seen as i times that.
 
-use super::{Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError};
+use super::{
+    Effect, Estimate, Given, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError,
+};
 
 /// Misalignment of the coupling in the input or output shaft.
 pub(super) struct CouplingMisalignment(pub(super) Shaft);
@@ -46,6 +48,13 @@ impl Effect for CouplingMisalignment {
             Parameter::number("beta_rad", 2.0 * root, polar.amplitude_std / root, "rad"),
             Parameter::number("phase_rad", polar.phase_rad, polar.phase_std_rad, "rad"),
         ]
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        match self.0 {
+            Shaft::Input => &[HandTest::SwapInputCoupling],
+            Shaft::Output => &[HandTest::SwapOutputCoupling],
+        }
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

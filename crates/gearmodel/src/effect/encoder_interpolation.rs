@@ -3,7 +3,8 @@
 //! on the samples (`gap::line_phase`). The shape is [order h, lines L].
 
 use super::{
-    Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError,
+    Carrier, Effect, Estimate, Given, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature,
+    StatedError,
 };
 
 /// Interpolation error of the input or output encoder.
@@ -58,6 +59,10 @@ impl Effect for EncoderInterpolation {
             parameters.push(Parameter::grid("order", order, ""));
         }
         parameters
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[HandTest::ReindexGear2]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -24,6 +24,7 @@ mod encoder_disc;
 mod encoder_interpolation;
 mod friction_windup;
 mod gear_eccentricity;
+mod hand_test;
 mod mesh_compliance;
 mod mesh_stiffness_variation;
 mod operating_point;
@@ -45,7 +46,8 @@ mod torsional_resonance;
 mod wear_drift;
 
 pub use documented::{Documented, Fold, Term};
-pub use operating_point::{Grain, MOST_LOADS, OperatingPoint, Plan, RevolutionsByLoad};
+pub use hand_test::HandTest;
+pub use operating_point::{Grain, MOST_LOADS, OperatingPoint, Plan, RevolutionsByLoad, nearest_level};
 pub use polar::Estimate;
 pub use rig::{MeshOrders, Rig};
 pub use signature::{Accumulates, Carrier, Parity, Signature};
@@ -189,6 +191,11 @@ pub trait Effect: Sync {
     /// Encoder within whose lines the trace lies: it is found on the samples, for means over angle do not show it.
     fn within_lines_of(&self) -> Option<Shaft> {
         None
+    }
+
+    /// Tests by hand that tell it from others which take part in them.
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[]
     }
 
     /// True where a shape is a list of times at which the level steps.
