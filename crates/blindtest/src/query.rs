@@ -34,7 +34,7 @@ pub enum QueryError {
 /// # Errors
 /// [`QueryError`] when there is no answer.
 pub fn diagnose(log: &Path, exclude: &[String]) -> Result<Value, QueryError> {
-    let options = Options { known: Vec::new(), exclude: exclude.to_vec() };
+    let options = Options { exclude: exclude.to_vec(), ..Options::default() };
     let diagnosed = Logs::open(&[log.to_owned()], None)
         .and_then(|logs| logs.diagnose(&options))
         .map_err(|source| QueryError::Refused { log: log.into(), source })?;

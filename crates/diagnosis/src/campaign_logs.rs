@@ -16,9 +16,9 @@ use riglog::{
     EncoderMetadata, LogError, LogParts, RunSpan, RunStream, RunTotals, RunVisitor, SampleBlock, StreamTotals,
 };
 
-use crate::Nominal;
 use crate::line_phase::LinePhase;
 use crate::reduce::{ReducedRun, Reducer, Sample};
+use crate::{Nominal, Settings};
 
 /// Blocks of samples that may wait between decoding and reducing.
 const WAITING_BLOCKS: usize = 64;
@@ -109,11 +109,11 @@ impl CampaignLogs {
     ///
     /// # Errors
     /// [`LogError`] as from [`RunStream::stream`].
-    pub fn reduce(&self, nominal: &Nominal) -> Result<ReducedLogs, LogError> {
+    pub fn reduce(&self, nominal: &Nominal, settings: &Settings) -> Result<ReducedLogs, LogError> {
         let found = match &self.logs[..] {
-            [(_, log)] => vec![self.decode_beside_reducing(log, nominal)],
+            [(_, log)] => vec![self.decode_beside_reducing(log, nominal, settings)],
             logs => on_all_cores(logs, |(_, log)| {
-                let mut sink = Sink::new(nominal);
+                let mut sink = Sink::new(nominal, settings);
                 let mut visitor = Visitor { origin_ns: self.origin_ns, deliver: |parcel| sink.take(parcel) };
                 let totals = log.stream(&mut visitor)?;
                 Ok((sink.finish(), totals))
@@ -129,11 +129,16 @@ impl CampaignLogs {
     }
 
     /// One core decodes while another reduces.
-    fn decode_beside_reducing(&self, log: &RunStream, nominal: &Nominal) -> Result<(Runs, StreamTotals), LogError> {
+    fn decode_beside_reducing(
+        &self,
+        log: &RunStream,
+        nominal: &Nominal,
+        settings: &Settings,
+    ) -> Result<(Runs, StreamTotals), LogError> {
         thread::scope(|scope| {
             let (sender, receiver): (SyncSender<Parcel>, Receiver<Parcel>) = sync_channel(WAITING_BLOCKS);
             let reducing = scope.spawn(move || {
-                let mut sink = Sink::new(nominal);
+                let mut sink = Sink::new(nominal, settings);
                 while let Ok(parcel) = receiver.recv() {
                     sink.take(parcel);
                 }
@@ -195,20 +200,21 @@ impl<F: FnMut(Parcel)> RunVisitor for Visitor<F> {
 /// Takes parcels, run after run.
 struct Sink<'a> {
     nominal: &'a Nominal,
+    settings: &'a Settings,
     under_way: Option<(Reducer<'a>, f64)>,
     runs: Runs,
 }
 
 impl<'a> Sink<'a> {
-    fn new(nominal: &'a Nominal) -> Self {
-        Self { nominal, under_way: None, runs: Vec::new() }
+    fn new(nominal: &'a Nominal, settings: &'a Settings) -> Self {
+        Self { nominal, settings, under_way: None, runs: Vec::new() }
     }
 
     fn take(&mut self, parcel: Parcel) {
         match parcel {
             Parcel::Run(span) => {
                 self.close();
-                let reducer = Reducer::new(self.nominal, span.direction, span.speed_rpm.abs());
+                let reducer = Reducer::new(self.nominal, span.direction, span.speed_rpm.abs(), self.settings);
                 self.under_way = Some((reducer, span.load_nm));
             }
             Parcel::Samples(samples) => {

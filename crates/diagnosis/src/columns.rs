@@ -1,4 +1,4 @@
-//! Values of all columns of a pool, and their sums over the grid.
+//! Values of all columns of a design matrix, and their sums over the grid.
 //!
 //! Most traces are the same in every revolution of a run: their columns hold one value a cell. Those that evolve hold one a place,
 //! and beside it their weighted sums over each cell, which is all that a column of cells needs of them.

@@ -13,15 +13,10 @@ use super::grid::Grid;
 use super::noise::Noise;
 use super::waves::WAVES;
 
-/// Resamples of the revolutions for intervals.
-const RESAMPLES: usize = 400;
-/// Prior variance of the zero, rad².
-const ZERO_RAD2: f64 = 1.0;
-
 /// Columns that are refitted, with their prior variances.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
-    /// Columns of the pool, the zero not among them.
+    /// Columns of the design matrix, the zero not among them.
     pub columns: Vec<usize>,
     /// Their prior variances, rad².
     pub prior_rad2: Vec<f64>,
@@ -39,6 +34,8 @@ pub struct HeldOut {
     revolutions: Vec<(usize, f64)>,
     /// Weight in all.
     weight: f64,
+    /// Prior variance of the zero, rad².
+    zero_rad2: f64,
 }
 
 /// Squared residual by revolution.
@@ -57,13 +54,13 @@ impl Errors {
 }
 
 impl HeldOut {
-    /// Sums for these columns of the pool. Units are runs, or revolutions where there is one run.
+    /// Sums for these columns of the design matrix. Units are runs, or revolutions where there is one run.
     #[must_use]
-    pub fn new(grid: &Grid, pool: &DesignMatrix, noise: &Noise, columns: &[usize]) -> Self {
+    pub fn new(grid: &Grid, design: &DesignMatrix, noise: &Noise, columns: &[usize]) -> Self {
         let mut all = vec![RESIDUAL, ZERO];
         all.extend(columns.iter().copied().filter(|c| *c != ZERO && *c != RESIDUAL));
         all.dedup();
-        let values: Vec<Vec<f64>> = all.par_iter().map(|c| pool.column(grid, *c)).collect();
+        let values: Vec<Vec<f64>> = all.par_iter().map(|c| design.column(grid, *c)).collect();
         let by_run = grid.plan.runs > 1;
         let units = if by_run { grid.directions.len() } else { grid.revolutions.len() };
         let p = all.len();
@@ -83,7 +80,7 @@ impl HeldOut {
             vec![(DMatrix::zeros(WAVES, WAVES), DMatrix::zeros(WAVES, p)); units];
         for (number, (revolution, square)) in grid.revolutions.iter().zip(&squares).enumerate() {
             let unit = if by_run { revolution.run } else { number };
-            let c = pool.waves[number].select_columns(&all) * precision;
+            let c = design.waves[number].select_columns(&all) * precision;
             if let Some(passing) = noise.revolution(number) {
                 let lost = &passing.half * &c;
                 grams[unit] += square * precision - lost.transpose() * &lost;
@@ -101,7 +98,8 @@ impl HeldOut {
             }
         }
         let weight = grid.weight.iter().sum();
-        Self { columns: all, grams, squares, revolutions, weight }
+        let zero_rad2 = design.evidence().zero_rad * design.evidence().zero_rad;
+        Self { columns: all, grams, squares, revolutions, weight, zero_rad2 }
     }
 
     /// Residual on each unit predicted from the others with a selection of columns.
@@ -123,7 +121,7 @@ impl HeldOut {
                 let rest = if self.grams.len() > 1 { &total - gram } else { total.clone() };
                 let mut a = DMatrix::from_fn(p, p, |m, n| rest[(places[m], places[n])]);
                 for n in 0..p {
-                    a[(n, n)] += 1.0 / if n == 0 { ZERO_RAD2 } else { selection.prior_rad2[n - 1].max(1e-20) };
+                    a[(n, n)] += 1.0 / if n == 0 { self.zero_rad2 } else { selection.prior_rad2[n - 1].max(1e-20) };
                 }
                 let b = DVector::from_fn(p, |n, _| rest[(places[n], 0)]);
                 Cholesky::new(a).map_or_else(|| DVector::zeros(p), |c| c.solve(&b))
@@ -154,7 +152,7 @@ impl HeldOut {
 /// Share of the reducible gap closed, with its 90 % interval from resampled revolutions; `None` where before is not above
 /// the floor.
 #[must_use]
-pub fn closed(before: &Errors, after: &Errors, floor_rad2: f64) -> Option<(f64, [f64; 2])> {
+pub fn closed(before: &Errors, after: &Errors, floor_rad2: f64, resamples: usize) -> Option<(f64, [f64; 2])> {
     let share = |b: f64, a: f64| (b - a) / (b - floor_rad2);
     let (b, a) = (before.mean(), after.mean());
     if b <= floor_rad2 * 1.000_001 {
@@ -162,7 +160,7 @@ pub fn closed(before: &Errors, after: &Errors, floor_rad2: f64) -> Option<(f64, 
     }
     let mut random = Pcg64Mcg::seed_from_u64(0x6761_7073);
     let count = before.by_revolution.len();
-    let mut shares: Vec<f64> = (0..RESAMPLES)
+    let mut shares: Vec<f64> = (0..resamples)
         .filter_map(|_| {
             let (mut weight, mut b, mut a) = (0.0, 0.0, 0.0);
             for _ in 0..count {
@@ -176,7 +174,7 @@ pub fn closed(before: &Errors, after: &Errors, floor_rad2: f64) -> Option<(f64, 
         .collect();
     shares.sort_by(f64::total_cmp);
     let value = share(b, a);
-    if shares.len() < RESAMPLES / 2 {
+    if shares.len() < resamples / 2 {
         return Some((value, [value, value]));
     }
     let quantile = |q: f64| shares[((shares.len() - 1) as f64 * q) as usize];
@@ -193,6 +191,7 @@ pub fn gap(
     within_rad2: f64,
     explained_rad2: f64,
     found: bool,
+    resamples: usize,
 ) -> Gap {
     let total = |mean: f64| (mean + within_rad2).max(0.0).sqrt();
     let closed = if found {
@@ -205,7 +204,7 @@ pub fn gap(
                 .collect(),
             weights: before.weights.clone(),
         };
-        closed(&full, after, floor_rad2)
+        closed(&full, after, floor_rad2, resamples)
     } else {
         None
     };

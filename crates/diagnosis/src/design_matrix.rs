@@ -13,14 +13,13 @@ use super::columns::{Columns, Values};
 use super::gram;
 use super::grid::Grid;
 use super::nuisance_patterns::Pattern;
+use super::settings::{DesignSettings, EvidenceSettings, Settings};
 use super::waves::{WAVES, waves};
 use gearmodel::effect::{Effect, Grain, OperatingPoint, Rig, Rows, Shape};
 
-/// Column of the residual and of the zero in the pool.
+/// Column of the residual and of the zero in the design matrix.
 pub(super) const RESIDUAL: usize = 0;
 pub(super) const ZERO: usize = 1;
-/// Blocks wider than this are scanned on a coarser grid of scales: 2, 8, 32, 128 µrad.
-pub(super) const WIDE: usize = 16;
 
 /// What a block of columns stands for.
 #[derive(Clone)]
@@ -60,8 +59,8 @@ impl Candidate {
     /// True where beside one of them the other explains nothing: steps at times of one's choice follow any random walk.
     #[must_use]
     pub fn excludes(&self, other: &Self) -> bool {
-        let walks = |cause: &Self| matches!(cause, Self::Unknown(Pattern::RandomWalk { .. }));
-        let steps = |cause: &Self| match cause {
+        let walks = |candidate: &Self| matches!(candidate, Self::Unknown(Pattern::RandomWalk { .. }));
+        let steps = |candidate: &Self| match candidate {
             Self::Effect { effect, .. } => effect.steps(),
             Self::Unknown(pattern) => matches!(pattern, Pattern::Step { .. }),
         };
@@ -80,14 +79,14 @@ impl Candidate {
     }
 }
 
-/// A block of unit-RMS columns in the pool.
+/// A block of unit-RMS columns in the design matrix.
 #[derive(Clone)]
 pub struct Block {
     /// What it stands for.
-    pub cause: Candidate,
-    /// Its columns in the pool.
+    pub candidate: Candidate,
+    /// Its columns in the design matrix.
     pub columns: std::ops::Range<usize>,
-    /// Raw amplitudes = `transform` · amplitudes in the pool.
+    /// Raw amplitudes = `transform` · amplitudes in the design matrix.
     pub transform: DMatrix<f64>,
 }
 
@@ -112,7 +111,7 @@ pub struct DesignMatrix {
     base: Arc<Base>,
 }
 
-/// What pools over one grid share.
+/// What design matrices over one grid share.
 struct Base {
     /// Sums of the weights over each cell.
     cell_weight: Vec<f64>,
@@ -120,10 +119,12 @@ struct Base {
     weighted: Vec<DMatrix<f64>>,
     /// ZᵀWZ of every revolution.
     wave_products: Vec<DMatrix<f64>>,
+    own: DesignSettings,
+    evidence: EvidenceSettings,
 }
 
 impl Base {
-    fn new(grid: &Grid) -> Self {
+    fn new(grid: &Grid, settings: &Settings) -> Self {
         let mut cell_weight = vec![0.0; grid.cells.len()];
         for (cell, weight) in grid.cell_of.iter().zip(&grid.weight) {
             cell_weight[*cell] += weight;
@@ -141,31 +142,31 @@ impl Base {
                 (weighted, products)
             })
             .unzip();
-        Self { cell_weight, weighted, wave_products }
+        Self { cell_weight, weighted, wave_products, own: settings.design, evidence: settings.evidence }
     }
 }
 
-/// Rows of a cause at points_of_operation.
-fn rows(cause: &Candidate, rig: &Rig, points_of_operation: &[OperatingPoint], width: usize) -> DMatrix<f64> {
-    let mut raw = DMatrix::zeros(points_of_operation.len(), width);
+/// Rows of a candidate at operating points.
+fn rows(candidate: &Candidate, rig: &Rig, operating_points: &[OperatingPoint], width: usize) -> DMatrix<f64> {
+    let mut raw = DMatrix::zeros(operating_points.len(), width);
     let (mut row, mut part) = (vec![0.0; width], vec![0.0; width]);
-    let grain = match cause {
+    let grain = match candidate {
         Candidate::Effect { effect, shape, .. } => effect.grain(shape),
         Candidate::Unknown(_) => Grain::Smooth,
     };
     let places = grain.places();
-    let mut take: Rows<'_> = match cause {
+    let mut take: Rows<'_> = match candidate {
         Candidate::Effect { effect, shape, .. } => effect.rows(rig, shape),
-        Candidate::Unknown(pattern) => Box::new(|station, row| pattern.row(station, row)),
+        Candidate::Unknown(pattern) => Box::new(|at, row| pattern.row(at, row)),
     };
-    for (number, station) in points_of_operation.iter().enumerate() {
+    for (number, at) in operating_points.iter().enumerate() {
         row.fill(0.0);
         if grain == Grain::Smooth {
-            take(station, &mut row);
+            take(at, &mut row);
         } else {
-            let mut near = *station;
+            let mut near = *at;
             for place in places {
-                near.move_from(station, place * station.spread_rad);
+                near.move_from(at, place * at.spread_rad);
                 part.fill(0.0);
                 take(&near, &mut part);
                 row.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x / places.len() as f64);
@@ -196,27 +197,25 @@ fn values(unit: &DMatrix<f64>, evolves: bool, transform: DMatrix<f64>) -> (Vec<V
 
 /// Blocks made at a time.
 const BATCH: usize = 64;
-/// Traces smaller than this part of a block's largest direction are not seen under the plan.
-const UNSEEN: f64 = 1e-5;
 
 impl DesignMatrix {
     /// The residual and the zero, without blocks.
     #[must_use]
-    pub fn new(grid: &Grid) -> Self {
-        let mut pool = Self {
+    pub fn new(grid: &Grid, settings: &Settings) -> Self {
+        let mut design = Self {
             blocks: Vec::new(),
             columns: Columns::default(),
             products: DMatrix::zeros(0, 0),
             waves: vec![DMatrix::zeros(WAVES, 0); grid.revolutions.len()],
-            base: Arc::new(Base::new(grid)),
+            base: Arc::new(Base::new(grid, settings)),
         };
-        pool.columns.push(grid, Values::Places(grid.rho_rad.clone()));
-        pool.columns.push(grid, Values::Cells(vec![1.0; grid.cells.len()]));
-        pool.grow_sums(grid);
-        pool
+        design.columns.push(grid, Values::Places(grid.rho_rad.clone()));
+        design.columns.push(grid, Values::Cells(vec![1.0; grid.cells.len()]));
+        design.grow_sums(grid);
+        design
     }
 
-    /// A pool of some of the blocks, in their order, for trials: it stays small.
+    /// A design matrix of some of the blocks, in their order, for trials: it stays small.
     #[must_use]
     pub fn only(&self, grid: &Grid, blocks: &[usize]) -> Self {
         let mut columns = vec![RESIDUAL, ZERO];
@@ -233,6 +232,12 @@ impl DesignMatrix {
             waves: self.waves.iter().map(|waves| waves.select_columns(&columns)).collect(),
             base: Arc::clone(&self.base),
         }
+    }
+
+    /// How the evidence of its blocks is weighed.
+    #[must_use]
+    pub(super) fn evidence(&self) -> &EvidenceSettings {
+        &self.base.evidence
     }
 
     /// Columns in all.
@@ -261,37 +266,38 @@ impl DesignMatrix {
     }
 
     /// Adds blocks; those that the plan cannot see are left out. Returns the numbers of those added.
-    pub fn add(&mut self, grid: &Grid, rig: &Rig, causes: &[Candidate]) -> Vec<usize> {
+    pub fn add(&mut self, grid: &Grid, rig: &Rig, candidates: &[Candidate]) -> Vec<usize> {
         let mut numbers = Vec::new();
-        let (evolving, others): (Vec<_>, Vec<_>) = causes.iter().partition(|cause| cause.evolves());
-        let width = |causes: &[&Candidate]| causes.iter().map(|cause| cause.width(rig)).sum();
+        let (evolving, others): (Vec<_>, Vec<_>) = candidates.iter().partition(|candidate| candidate.evolves());
+        let width = |candidates: &[&Candidate]| candidates.iter().map(|candidate| candidate.width(rig)).sum();
         self.columns.reserve(grid, width(&others), width(&evolving));
         // Not all at once: before a column stands among the others it takes up memory twice.
-        for batch in causes.chunks(BATCH) {
-            let made: Vec<_> = batch.par_iter().map(|cause| self.unit_columns(grid, rig, cause)).collect();
-            for (cause, (values, transform)) in batch.iter().zip(made).filter_map(|(cause, made)| Some((cause, made?)))
+        for batch in candidates.chunks(BATCH) {
+            let made: Vec<_> = batch.par_iter().map(|candidate| self.unit_columns(grid, rig, candidate)).collect();
+            for (candidate, (values, transform)) in
+                batch.iter().zip(made).filter_map(|(candidate, made)| Some((candidate, made?)))
             {
                 let first = self.width();
                 values.into_iter().for_each(|values| self.columns.push(grid, values));
                 numbers.push(self.blocks.len());
-                self.blocks.push(Block { cause: cause.clone(), columns: first..self.width(), transform });
+                self.blocks.push(Block { candidate: candidate.clone(), columns: first..self.width(), transform });
             }
         }
         self.grow_sums(grid);
         numbers
     }
 
-    fn unit_columns(&self, grid: &Grid, rig: &Rig, cause: &Candidate) -> Option<(Vec<Values>, DMatrix<f64>)> {
-        let (width, evolves) = (cause.width(rig), cause.evolves());
-        let (points_of_operation, weights) =
+    fn unit_columns(&self, grid: &Grid, rig: &Rig, candidate: &Candidate) -> Option<(Vec<Values>, DMatrix<f64>)> {
+        let (width, evolves) = (candidate.width(rig), candidate.evolves());
+        let (operating_points, weights) =
             if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.base.cell_weight) };
-        let growing = match cause {
+        let growing = match candidate {
             Candidate::Unknown(pattern) => pattern.growing(),
             Candidate::Effect { .. } => None,
         };
         let raw = match growing {
             Some((steady, mean_s)) => grown(grid, &rows(&Candidate::Unknown(steady), rig, &grid.cells, width), mean_s),
-            None => rows(cause, rig, points_of_operation, width),
+            None => rows(candidate, rig, operating_points, width),
         };
         let total: f64 = weights.iter().sum();
         // A constant is the zero's; what is left of a column is its trace.
@@ -303,16 +309,16 @@ impl DesignMatrix {
         }
         // A column that is all zero beside the constant must not count through its rounding.
         let size = raw.amax();
-        if scale.max() < 1e-9 * size {
+        if scale.max() < self.base.own.constant * size {
             return None;
         }
-        if matches!(cause, Candidate::Unknown(pattern) if pattern.keeps_sizes()) {
+        if matches!(candidate, Candidate::Unknown(pattern) if pattern.keeps_sizes()) {
             let transform = DMatrix::identity(width, width) * (width as f64 / covariance.trace()).sqrt();
             return Some(values(&(raw * transform[(0, 0)]), evolves, transform));
         }
         let eigen = SymmetricEigen::new(covariance);
-        let largest = eigen.eigenvalues.max();
-        let kept: Vec<usize> = (0..width).filter(|n| eigen.eigenvalues[*n] > UNSEEN * UNSEEN * largest).collect();
+        let (largest, unseen) = (eigen.eigenvalues.max(), self.base.own.unseen);
+        let kept: Vec<usize> = (0..width).filter(|n| eigen.eigenvalues[*n] > unseen * unseen * largest).collect();
         let mut transform = DMatrix::zeros(width, kept.len());
         for (to, from) in kept.iter().enumerate() {
             let mut direction = eigen.eigenvectors.column(*from) / eigen.eigenvalues[*from].sqrt();

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value as Json};
 
+use super::settings::Settings;
 use gearmodel::effect::Signature;
 
 /// The whole answer.
@@ -27,6 +28,8 @@ pub struct Diagnosis {
     pub warnings: Vec<String>,
     /// Angles between the subspaces of the effects that matter here, deg.
     pub confusability: Confusability,
+    /// Every number that was chosen for it.
+    pub settings: Settings,
     /// The model found: what was added to the nominal one.
     #[serde(skip)]
     pub found: gearmodel::effect::predict::Found,

@@ -7,26 +7,17 @@ use std::f64::consts::TAU;
 
 use super::grid::Grid;
 use super::noise::Noise;
-use super::nuisance_patterns::{HIGHEST_ORDER, Pattern, Weight};
+use super::nuisance_patterns::{Pattern, Weight};
+use super::settings::{GhostSettings, Settings};
 use gearmodel::effect::{OperatingPoint, Shaft};
 
-/// Highest order looked for.
-const HIGHEST: usize = 340;
-/// Neighbours on either side that a line must stand out of, and how far it must, in amplitudes of the one in their middle.
-const NEIGHBOURS: usize = 8;
-const OUTSTANDING: f64 = 4.0;
-/// Least evidence of a line against white noise, nats.
-const LEAST_NATS: f64 = 12.0;
-/// Part of the strongest line's amplitude under which another that is no harmonic of it may be its foot.
-const LEAKS: f64 = 0.15;
-/// Most lines a shaft.
-const MOST: usize = 10;
 /// Bins of a turn, over which the residual is transformed.
 const BINS: usize = 1024;
 
 /// Patterns of the lines that stand out of a residual.
 #[must_use]
-pub fn find(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Pattern> {
+pub fn find(grid: &Grid, noise: &Noise, rest: &[f64], settings: &Settings) -> Vec<Pattern> {
+    let own = &settings.ghosts;
     let mut patterns = Vec::new();
     for (shaft, turns) in [Shaft::Input, Shaft::Output].into_iter().zip(grid.plan.turns) {
         if turns < 1.0 {
@@ -34,18 +25,19 @@ pub fn find(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Pattern> {
         }
         let spectra: Vec<Spectrum> = [1.0, -1.0]
             .into_iter()
-            .filter_map(|sense| Spectrum::new(grid, rest, shaft, &|at| at.sense * sense > 0.0))
+            .filter_map(|sense| Spectrum::new(grid, rest, shaft, &|at| at.sense * sense > 0.0, own.highest))
             .collect();
-        let mut lines: Vec<(usize, f64)> = spectra.iter().flat_map(|s| s.lines(noise.white_rad2)).collect();
+        let mut lines: Vec<(usize, f64)> =
+            spectra.iter().flat_map(|s| s.lines(noise.white_rad2, settings.nuisance.highest_order, own)).collect();
         lines.sort_by(|a, b| b.1.total_cmp(&a.1));
         let mut orders: Vec<usize> = Vec::new();
         let mut sizes: Vec<f64> = Vec::new();
         for (order, nats) in lines {
             // The samples are not spread evenly over the turn: a strong line leaks into others.
             let leaks = orders.first().zip(sizes.first()).is_some_and(|(strongest, size): (&usize, &f64)| {
-                !order.is_multiple_of(*strongest) && nats.sqrt() < LEAKS * size
+                !order.is_multiple_of(*strongest) && nats.sqrt() < own.leaks * size
             });
-            if !leaks && !orders.contains(&order) && orders.len() < MOST {
+            if !leaks && !orders.contains(&order) && orders.len() < own.most {
                 orders.push(order);
                 sizes.push(nats.sqrt());
             }
@@ -80,7 +72,13 @@ struct Spectrum {
 
 impl Spectrum {
     /// Of the places that count; `None` where they leave much of the turn out.
-    fn new(grid: &Grid, rest: &[f64], shaft: Shaft, counts: &dyn Fn(&OperatingPoint) -> bool) -> Option<Self> {
+    fn new(
+        grid: &Grid,
+        rest: &[f64],
+        shaft: Shaft,
+        counts: &dyn Fn(&OperatingPoint) -> bool,
+        highest: usize,
+    ) -> Option<Self> {
         let mut sums = vec![(0.0, 0.0); BINS];
         for ((at, y), w) in grid.places.iter().zip(rest).zip(&grid.weight).filter(|((at, _), _)| counts(at)) {
             let bin = ((at.angle_rad(shaft) / TAU).rem_euclid(1.0) * BINS as f64) as usize;
@@ -105,21 +103,21 @@ impl Spectrum {
             })
             .collect();
         FftPlanner::new().plan_fft_forward(BINS).process(&mut turn);
-        Some(Self { amplitudes: turn[..=HIGHEST].iter().map(|x| 2.0 * x.norm() / BINS as f64).collect(), samples })
+        Some(Self { amplitudes: turn[..=highest].iter().map(|x| 2.0 * x.norm() / BINS as f64).collect(), samples })
     }
 
     /// Orders that stand out, with their evidence in nats.
-    fn lines(&self, white_rad2: f64) -> Vec<(usize, f64)> {
-        (HIGHEST_ORDER + 1..=HIGHEST - NEIGHBOURS)
+    fn lines(&self, white_rad2: f64, above: usize, own: &GhostSettings) -> Vec<(usize, f64)> {
+        (above + 1..=own.highest - own.neighbours)
             .filter_map(|order| {
-                let mut about: Vec<f64> = (order - NEIGHBOURS..=order + NEIGHBOURS)
+                let mut about: Vec<f64> = (order - own.neighbours..=order + own.neighbours)
                     .filter(|n| n.abs_diff(order) > 1)
                     .map(|n| self.amplitudes[n])
                     .collect();
                 about.sort_by(f64::total_cmp);
                 let amplitude = self.amplitudes[order];
                 let nats = amplitude * amplitude * self.samples / (4.0 * white_rad2);
-                (nats > LEAST_NATS && amplitude > OUTSTANDING * about[about.len() / 2]).then_some((order, nats))
+                (nats > own.least_nats && amplitude > own.outstanding * about[about.len() / 2]).then_some((order, nats))
             })
             .collect()
     }
@@ -130,9 +128,11 @@ mod tests {
     use super::*;
 
     fn spectrum(line: f64, scatter: f64) -> Vec<usize> {
-        let mut amplitudes: Vec<f64> = (0..=HIGHEST).map(|n| scatter * (1.0 + 0.5 * (1.3 * n as f64).sin())).collect();
+        let own = GhostSettings::default();
+        let mut amplitudes: Vec<f64> =
+            (0..=own.highest).map(|n| scatter * (1.0 + 0.5 * (1.3 * n as f64).sin())).collect();
         amplitudes[60] = line;
-        Spectrum { amplitudes, samples: 1e5 }.lines(1e-10).into_iter().map(|(order, _)| order).collect()
+        Spectrum { amplitudes, samples: 1e5 }.lines(1e-10, 8, &own).into_iter().map(|(order, _)| order).collect()
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Points → revolutions × angle bins, with a station for every bin.
+//! Points → revolutions × angle bins, with an operating point for every bin.
 //!
 //! A revolution begins where its run begins, so that n full turns are n revolutions wherever they start. Columns that are
 //! the same in every revolution of a run are evaluated once a run and bin (a *cell*); columns that evolve, at every bin of
@@ -6,16 +6,12 @@
 
 use std::f64::consts::TAU;
 
+use super::levels::levels;
+use super::local_speed::{local_speeds, mean_speed};
 use super::reduce::{Point, ReducedRun};
+use super::settings::{ReductionSettings, Settings};
 use gearmodel::Direction;
 use gearmodel::effect::{OperatingPoint, Plan, RevolutionsByLoad, Rig};
-
-/// Bins a turn where there are few revolutions.
-const MOST_BINS: usize = 720;
-/// Most revolutions held apart; beyond, neighbours in a run are averaged.
-const MOST_REVOLUTIONS: usize = 64;
-/// Most places in all.
-const MOST_PLACES: usize = 60_000;
 
 /// A revolution, or the mean of neighbouring ones.
 #[derive(Clone, Debug)]
@@ -35,11 +31,11 @@ pub struct Grid {
     pub revolutions: Vec<Revolution>,
     /// Runs' senses.
     pub directions: Vec<Direction>,
-    /// OperatingPoint of every place.
+    /// Operating point of every place.
     pub places: Vec<OperatingPoint>,
     /// Cell of every place.
     pub cell_of: Vec<usize>,
-    /// OperatingPoint of every cell.
+    /// Operating point of every cell.
     pub cells: Vec<OperatingPoint>,
     /// Part of its revolution at which every cell stands, 0 to 1.
     pub part_of_cell: Vec<f64>,
@@ -92,7 +88,8 @@ impl Sum {
 impl Grid {
     /// Bins the runs' points.
     #[must_use]
-    pub fn new(rig: &Rig, runs: &[ReducedRun]) -> Self {
+    pub fn new(rig: &Rig, runs: &[ReducedRun], settings: &Settings) -> Self {
+        let same_level = settings.reduction.same_level;
         let way_of = |run: &ReducedRun, point: &Point| (point.theta1_rad - run.points[0].theta1_rad).abs() / TAU;
         let turns: Vec<usize> = runs
             .iter()
@@ -101,16 +98,14 @@ impl Grid {
         let total: usize = turns.iter().sum();
         // Revolutions may be averaged only where the driven gear closes with them.
         let closes = (rig.pair().closure() - rig.pair().closure().round()).abs() < 1e-9;
-        let merge = if closes { total.div_ceil(MOST_REVOLUTIONS).max(1) } else { 1 };
+        let merge = if closes { total.div_ceil(settings.grid.most_revolutions).max(1) } else { 1 };
         let merged: usize = turns.iter().map(|n| n.div_ceil(merge)).sum();
-        let bins = (MOST_PLACES / merged.max(1)).clamp(24, MOST_BINS);
+        let bins =
+            (settings.grid.most_places / merged.max(1)).clamp(settings.grid.fewest_bins, settings.grid.most_bins);
 
         let start_s = runs.iter().filter_map(|run| run.points.first()).map(|p| p.time_s).fold(f64::INFINITY, f64::min);
-        let loads_nm = levels(runs.iter().flat_map(|run| run.points.iter().map(|p| p.load_nm)));
-        let mut revolutions_by_load = RevolutionsByLoad::default();
-        for (slot, load) in revolutions_by_load.load_nm.iter_mut().zip(&loads_nm) {
-            *slot = *load;
-        }
+        let loads_nm = levels(runs.iter().flat_map(|run| run.points.iter().map(|p| p.load_nm)), same_level);
+        let mut revolutions_by_load = RevolutionsByLoad::at_loads(&loads_nm);
         let mut order: Vec<usize> = (0..runs.len()).filter(|n| !runs[*n].points.is_empty()).collect();
         order.sort_by(|a, b| runs[*a].points[0].time_s.total_cmp(&runs[*b].points[0].time_s));
 
@@ -135,7 +130,7 @@ impl Grid {
             let run = &runs[n];
             let (first, last) = (run.points[0], run.points[run.points.len() - 1]);
             end_s = end_s.max(last.time_s);
-            let mean_speed = (last.theta1_rad - first.theta1_rad) / (last.time_s - first.time_s).max(1e-9);
+            let mean_speed = mean_speed(run);
             let nominal = run.direction.sign() * run.speed_rpm * TAU / 60.0;
             let speed = if run.speed_rpm > 0.0 { nominal } else { mean_speed };
             speeds.push(speed.abs());
@@ -146,13 +141,13 @@ impl Grid {
                 rig,
                 run,
                 n,
-                &RunFrame { turns: turns[n], merge, closes, start_s, mean_speed },
+                &RunFrame { turns: turns[n], merge, closes, start_s, mean_speed, settings: &settings.reduction },
                 &mut revolutions_by_load,
             );
         }
         grid.plan.runs = grid.directions.len();
         grid.plan.loads_nm = loads_nm;
-        grid.plan.speeds_rad_per_s = levels(speeds.into_iter());
+        grid.plan.speeds_rad_per_s = levels(speeds.into_iter(), same_level);
         grid.plan.duration_s = end_s - start_s;
         grid.plan.turns = [|at: &OperatingPoint| at.theta1_rad, |at: &OperatingPoint| at.theta2_rad].map(
             |angle: fn(&OperatingPoint) -> f64| {
@@ -182,94 +177,43 @@ impl Grid {
         rig: &Rig,
         run: &ReducedRun,
         number: usize,
-        frame: &RunFrame,
+        frame: &RunFrame<'_>,
         revolutions_by_load: &mut RevolutionsByLoad,
     ) {
         let index = self.directions.len();
         self.directions.push(run.direction);
         let bins = self.bins;
         let revolutions = frame.turns.div_ceil(frame.merge).max(1);
-        let mut sums = vec![Sum::default(); revolutions * bins];
-        let origin_rad = run.points[0].theta1_rad;
-        let speeds = local_speeds(&run.points, frame.mean_speed);
-        let mut books = vec![RevolutionsByLoad::default(); revolutions * bins];
-        let mut speed_sums = vec![0.0; revolutions * bins];
-        let mut keys = Vec::with_capacity(run.points.len());
-        let mut before = origin_rad;
-        for (point, speed) in run.points.iter().zip(&speeds) {
-            let step_rev = (point.theta1_rad - before) / TAU;
-            before = point.theta1_rad;
-            let slot = nearest(&revolutions_by_load.load_nm, point.load_nm);
-            revolutions_by_load.signed_rev[slot] += step_rev;
-            revolutions_by_load.way_rev[slot] += step_rev.abs();
-            // Bins count from where the run begins, so that none holds both ends of a revolution.
-            let way_rev = (point.theta1_rad - origin_rad).abs() / TAU;
-            let turn = (way_rev as usize).min(frame.turns - 1);
-            let bin = (((way_rev - turn as f64).clamp(0.0, 1.0) * bins as f64) as usize).min(bins - 1);
-            let turn_rev = turn as f64;
-            let turn = turn / frame.merge;
-            let key = turn * bins + bin;
-            keys.push(key);
-            let w = point.samples;
-            // Means of the first turn's angles stand for all turns of a merged revolution.
-            let turns_away = ((point.theta1_rad - origin_rad) / TAU).trunc() * f64::from(u8::from(frame.merge > 1));
-            let sum = &mut sums[key];
-            let middle_rev = turn_rev + (bin as f64 + 0.5) / bins as f64;
-            sum.add_spread(w, (way_rev - middle_rev) * TAU, point.spread_rad2);
-            sum.time += w * (point.time_s - frame.start_s);
-            sum.theta1 += w * (point.theta1_rad - TAU * turns_away);
-            sum.theta2 += w * (point.theta2_rad - TAU * turns_away * rig.pair().closure());
-            sum.rho += w * point.rho_rad;
-            sum.rho2 += w * point.rho_rad * point.rho_rad;
-            sum.load += w * point.load_nm;
-            sum.way += w * revolutions_by_load.way_rev.iter().sum::<f64>();
-            speed_sums[key] += w * speed;
-            for slot in 0..revolutions_by_load.load_nm.len() {
-                books[key].signed_rev[slot] += w * revolutions_by_load.signed_rev[slot];
-                books[key].way_rev[slot] += w * revolutions_by_load.way_rev[slot];
-            }
-        }
-        let steady = frame.closes && steady_load(&run.points);
-        let mut place_of_key = vec![usize::MAX; sums.len()];
+        let binned = Binned::new(rig, run, frame, [revolutions, bins], revolutions_by_load);
+        let steady = frame.closes && steady_load(&run.points, frame.settings.same_level);
+        let mut place_of_key = vec![usize::MAX; binned.sums.len()];
         let mut cell_of_bin = vec![usize::MAX; bins];
         let first_cell = self.cells.len();
-        // Way of a cell's first station from the bin's middle, and the ways of all of its places.
+        // Way of a cell's first operating point from the bin's middle, and the ways of all of its places.
         let mut cell_sums: Vec<(f64, Sum)> = Vec::new();
         for revolution in 0..revolutions {
             let first = self.places.len();
             for (bin, cell) in cell_of_bin.iter_mut().enumerate() {
                 let key = revolution * bins + bin;
-                let sum = sums[key];
+                let sum = binned.sums[key];
                 if sum.weight == 0.0 {
                     continue;
                 }
-                let w = sum.weight;
-                let mut station = rig.operating_point(sum.theta1 / w, sum.theta2 / w, run.direction);
-                station.load_nm = sum.load / w;
-                station.time_s = sum.time / w;
-                station.way_rev = sum.way / w;
-                station.speed_rad_per_s = speed_sums[key] / w;
-                station.run = index;
+                let at = OperatingPoint { run: index, ..binned.operating_point(key, rig, run.direction) };
                 let (off_rad, variance_rad2) = sum.spread();
-                station.spread_rad = variance_rad2.sqrt();
-                station.revolutions_by_load = RevolutionsByLoad {
-                    load_nm: revolutions_by_load.load_nm,
-                    signed_rev: books[key].signed_rev.map(|x| x / w),
-                    way_rev: books[key].way_rev.map(|x| x / w),
-                };
                 if !steady || *cell == usize::MAX {
                     *cell = self.cells.len();
-                    self.cells.push(station);
+                    self.cells.push(at);
                     self.part_of_cell.push((bin as f64 + 0.5) / bins as f64);
                     cell_sums.push((off_rad, Sum::default()));
                 }
-                cell_sums[*cell - first_cell].1.add_spread(w, off_rad, variance_rad2);
+                cell_sums[*cell - first_cell].1.add_spread(sum.weight, off_rad, variance_rad2);
                 place_of_key[key] = self.places.len();
-                self.places.push(station);
+                self.places.push(at);
                 self.cell_of.push(*cell);
-                self.rho_rad.push(sum.rho / w);
-                self.weight.push(w);
-                self.within_rad2 += (sum.rho2 - sum.rho * sum.rho / w).max(0.0);
+                self.rho_rad.push(sum.rho / sum.weight);
+                self.weight.push(sum.weight);
+                self.within_rad2 += (sum.rho2 - sum.rho * sum.rho / sum.weight).max(0.0);
             }
             let places = first..self.places.len();
             if !places.is_empty() {
@@ -285,82 +229,104 @@ impl Grid {
             cell.take_angles_of(&rig.operating_point(theta1_rad, theta2_rad, run.direction));
             cell.spread_rad = variance_rad2.sqrt();
         }
-        self.place_of_point[number] = keys.into_iter().map(|key| place_of_key[key]).collect();
+        self.place_of_point[number] = binned.keys.into_iter().map(|key| place_of_key[key]).collect();
+    }
+}
+
+/// A run's points by revolution and bin; the key of a bin is its number in the run.
+struct Binned {
+    /// Key of every point.
+    keys: Vec<usize>,
+    sums: Vec<Sum>,
+    /// Weighted sums of speeds, and of the revolutions driven so far.
+    speeds: Vec<f64>,
+    revolutions_by_load: Vec<RevolutionsByLoad>,
+}
+
+impl Binned {
+    fn new(
+        rig: &Rig,
+        run: &ReducedRun,
+        frame: &RunFrame<'_>,
+        [revolutions, bins]: [usize; 2],
+        revolutions_by_load: &mut RevolutionsByLoad,
+    ) -> Self {
+        let mut binned = Self {
+            keys: Vec::with_capacity(run.points.len()),
+            sums: vec![Sum::default(); revolutions * bins],
+            speeds: vec![0.0; revolutions * bins],
+            revolutions_by_load: vec![RevolutionsByLoad::at_loads(&revolutions_by_load.load_nm); revolutions * bins],
+        };
+        let origin_rad = run.points[0].theta1_rad;
+        let speeds = local_speeds(&run.points, frame.mean_speed, frame.settings);
+        let mut before = origin_rad;
+        for (point, speed) in run.points.iter().zip(&speeds) {
+            revolutions_by_load.turn(point.load_nm, (point.theta1_rad - before) / TAU);
+            before = point.theta1_rad;
+            // Bins count from where the run begins, so that none holds both ends of a revolution.
+            let way_rev = (point.theta1_rad - origin_rad).abs() / TAU;
+            let turn = (way_rev as usize).min(frame.turns - 1);
+            let bin = (((way_rev - turn as f64).clamp(0.0, 1.0) * bins as f64) as usize).min(bins - 1);
+            let key = turn / frame.merge * bins + bin;
+            binned.keys.push(key);
+            let w = point.samples;
+            // Means of the first turn's angles stand for all turns of a merged revolution.
+            let turns_away = ((point.theta1_rad - origin_rad) / TAU).trunc() * f64::from(u8::from(frame.merge > 1));
+            let sum = &mut binned.sums[key];
+            let middle_rev = turn as f64 + (bin as f64 + 0.5) / bins as f64;
+            sum.add_spread(w, (way_rev - middle_rev) * TAU, point.spread_rad2);
+            sum.time += w * (point.time_s - frame.start_s);
+            sum.theta1 += w * (point.theta1_rad - TAU * turns_away);
+            sum.theta2 += w * (point.theta2_rad - TAU * turns_away * rig.pair().closure());
+            sum.rho += w * point.rho_rad;
+            sum.rho2 += w * point.rho_rad * point.rho_rad;
+            sum.load += w * point.load_nm;
+            sum.way += w * revolutions_by_load.total_way_rev();
+            binned.speeds[key] += w * speed;
+            let so_far = &mut binned.revolutions_by_load[key];
+            for slot in 0..revolutions_by_load.load_nm.len() {
+                so_far.signed_rev[slot] += w * revolutions_by_load.signed_rev[slot];
+                so_far.way_rev[slot] += w * revolutions_by_load.way_rev[slot];
+            }
+        }
+        binned
+    }
+
+    /// Mean operating point of a bin.
+    fn operating_point(&self, key: usize, rig: &Rig, direction: Direction) -> OperatingPoint {
+        let sum = &self.sums[key];
+        let w = sum.weight;
+        let so_far = &self.revolutions_by_load[key];
+        OperatingPoint {
+            load_nm: sum.load / w,
+            time_s: sum.time / w,
+            way_rev: sum.way / w,
+            speed_rad_per_s: self.speeds[key] / w,
+            spread_rad: sum.spread().1.sqrt(),
+            revolutions_by_load: RevolutionsByLoad {
+                load_nm: so_far.load_nm,
+                signed_rev: so_far.signed_rev.map(|x| x / w),
+                way_rev: so_far.way_rev.map(|x| x / w),
+            },
+            ..rig.operating_point(sum.theta1 / w, sum.theta2 / w, direction)
+        }
     }
 }
 
 /// What a run's binning needs beside its points.
-struct RunFrame {
+struct RunFrame<'a> {
     turns: usize,
     merge: usize,
     closes: bool,
     start_s: f64,
     mean_speed: f64,
+    settings: &'a ReductionSettings,
 }
 
-/// Distinct values, at most as many as a revolutions_by_load holds; nearer than 2 % of the largest count as one.
-fn levels(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut found: Vec<(f64, f64)> = Vec::new();
-    let mut sorted: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let reach = sorted.iter().fold(0.0_f64, |m, v| m.max(v.abs())) * 0.02;
-    for value in sorted {
-        match found.last_mut() {
-            Some((mean, count)) if value - *mean <= reach => {
-                *mean += (value - *mean) / (*count + 1.0);
-                *count += 1.0;
-            }
-            _ => found.push((value, 1.0)),
-        }
-    }
-    // More levels than a revolutions_by_load has: the nearest neighbours become one.
-    while found.len() > gearmodel::effect::MOST_LOADS {
-        let Some(at) =
-            (1..found.len()).min_by(|a, b| (found[*a].0 - found[*a - 1].0).total_cmp(&(found[*b].0 - found[*b - 1].0)))
-        else {
-            break;
-        };
-        let (value, count) = found.remove(at);
-        let (mean, had) = found[at - 1];
-        found[at - 1] = ((mean * had + value * count) / (had + count), had + count);
-    }
-    found.into_iter().map(|(mean, _)| mean).collect()
-}
-
-/// Place of the level nearest to a value; 0 where there is none.
-pub(super) fn nearest(levels: &[f64], value: f64) -> usize {
-    (0..levels.len()).min_by(|a, b| (levels[*a] - value).abs().total_cmp(&(levels[*b] - value).abs())).unwrap_or(0)
-}
-
-/// Whether a run keeps its load within 2 % of its largest.
-fn steady_load(points: &[Point]) -> bool {
+/// Whether a run keeps its load within a part of its largest.
+fn steady_load(points: &[Point], same_level: f64) -> bool {
     let (low, high) = points
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.load_nm), high.max(p.load_nm)));
-    high - low <= 0.02 * high.abs().max(low.abs()).max(1e-9)
-}
-
-/// Speed at every point over a hundredth of a turn about it, rad/s.
-fn local_speeds(points: &[Point], mean: f64) -> Vec<f64> {
-    let half = TAU / 100.0;
-    let (mut low, mut high) = (0, 0);
-    points
-        .iter()
-        .map(|point| {
-            while (points[low].theta1_rad - point.theta1_rad).abs() > half && low + 1 < points.len() {
-                low += 1;
-            }
-            while high + 1 < points.len() && (points[high].theta1_rad - point.theta1_rad).abs() < half {
-                high += 1;
-            }
-            let span_s = points[high].time_s - points[low].time_s;
-            let speed = (points[high].theta1_rad - points[low].theta1_rad) / span_s;
-            // A pause or a gap inside the segment says nothing about the speed.
-            if span_s > 0.0 && speed.is_finite() && speed * mean > 0.0 && (speed / mean - 1.0).abs() < 0.5 {
-                speed
-            } else {
-                mean
-            }
-        })
-        .collect()
+    high - low <= same_level * high.abs().max(low.abs()).max(1e-9)
 }

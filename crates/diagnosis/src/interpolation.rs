@@ -6,34 +6,27 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 use super::nominal::Nominal;
+use super::settings::LineSettings;
 use gearmodel::Direction;
 use gearmodel::recording::Recording;
 
 /// Cells a turn of the search for lines: lines up to half of that are seen.
 const CELLS: usize = 1 << 18;
-/// Fewest and most lines looked for; teeth and their harmonics lie below.
-const LINES: std::ops::Range<usize> = 700..CELLS / 3;
-/// Log odds, over all lines looked for, from which a peak is taken for a disc's lines.
-const FOUND_NATS: f64 = 7.0;
-/// Samples are in step with the angle where their own spectrum has a line of this part of its sum.
-const IN_STEP: f64 = 0.15;
-/// A line stands alone where no other is more than this part of its power, its harmonics and its foot left out.
-const ALONE: f64 = 0.1;
-const BESIDE: usize = 20;
-/// The residual is freed of its mean over this part of a turn, or over so many samples where they are sparse.
-const WINDOW_RAD: f64 = TAU / 360.0;
-const WINDOW_SAMPLES: usize = 4;
+/// Most lines that are looked for: above, a wave is seen too badly.
+const MOST_LINES: usize = CELLS / 3;
 
-/// Lines of the input and output encoder where the samples show a wave of their period; `known` are left as they are.
-#[must_use]
-pub fn search_lines(parts: &[Recording<'_>], nominal: &Nominal, known: [Option<f64>; 2]) -> [Option<f64>; 2] {
-    if known.iter().all(Option::is_some) {
-        return known;
-    }
-    let mut series = [vec![Complex::new(0.0, 0.0); CELLS], vec![Complex::new(0.0, 0.0); CELLS]];
-    let mut seen_at = series.clone();
-    let mut power = [0.0; 2];
-    for part in parts {
+/// The detrended residual by the angle of each encoder.
+struct Folded {
+    /// Sums of what the encoder would have to read wrongly, by cell of its turn.
+    series: [Vec<Complex<f64>>; 2],
+    /// Samples by cell.
+    seen_at: [Vec<Complex<f64>>; 2],
+    /// Sums of squares.
+    power: [f64; 2],
+}
+
+impl Folded {
+    fn add(&mut self, part: &Recording<'_>, nominal: &Nominal, settings: &LineSettings) {
         let columns = part.columns();
         let load_nm = columns.load_nm.mean();
         let direction = columns.direction.unwrap_or(Direction::Ccw);
@@ -53,12 +46,11 @@ pub fn search_lines(parts: &[Recording<'_>], nominal: &Nominal, known: [Option<f
         let (mut low, mut high) = (0, 0);
         for (at, n) in seen.iter().enumerate() {
             let theta1_rad = columns.theta1_rad[*n];
-            while (theta1_rad - columns.theta1_rad[seen[low]]).abs() > WINDOW_RAD && low + WINDOW_SAMPLES < at {
+            let off = |other: usize| (theta1_rad - columns.theta1_rad[seen[other]]).abs();
+            while off(low) > settings.window_rad && low + settings.window_samples < at {
                 low += 1;
             }
-            while high + 1 < seen.len()
-                && ((columns.theta1_rad[seen[high]] - theta1_rad).abs() < WINDOW_RAD || high < at + WINDOW_SAMPLES)
-            {
+            while high + 1 < seen.len() && (off(high) < settings.window_rad || high < at + settings.window_samples) {
                 high += 1;
             }
             let deviation = rho[at] - (sums[high + 1] - sums[low]) / (high + 1 - low) as f64;
@@ -66,19 +58,40 @@ pub fn search_lines(parts: &[Recording<'_>], nominal: &Nominal, known: [Option<f
                 [(theta1_rad, -pair.ratio(theta1_rad)), (columns.theta2_rad[*n], 1.0)].into_iter().enumerate()
             {
                 let cell = ((angle_rad / TAU).rem_euclid(1.0) * CELLS as f64) as usize % CELLS;
-                series[encoder][cell].re += gain * deviation;
-                seen_at[encoder][cell].re += 1.0;
-                power[encoder] += gain * gain * deviation * deviation;
+                self.series[encoder][cell].re += gain * deviation;
+                self.seen_at[encoder][cell].re += 1.0;
+                self.power[encoder] += gain * gain * deviation * deviation;
             }
         }
     }
+}
+
+/// Lines of the input and output encoder where the samples show a wave of their period; `known` are left as they are.
+#[must_use]
+pub fn search_lines(
+    parts: &[Recording<'_>],
+    nominal: &Nominal,
+    known: [Option<f64>; 2],
+    settings: &LineSettings,
+) -> [Option<f64>; 2] {
+    let lines_looked_for = settings.fewest..MOST_LINES;
+    if known.iter().all(Option::is_some) {
+        return known;
+    }
+    let mut folded = Folded {
+        series: [vec![Complex::new(0.0, 0.0); CELLS], vec![Complex::new(0.0, 0.0); CELLS]],
+        seen_at: [vec![Complex::new(0.0, 0.0); CELLS], vec![Complex::new(0.0, 0.0); CELLS]],
+        power: [0.0; 2],
+    };
+    parts.iter().for_each(|part| folded.add(part, nominal, settings));
+    let Folded { series, seen_at, power } = folded;
     let transform = FftPlanner::new().plan_fft_forward(CELLS);
     // Samples in step with one of the angles show every low order again at high ones: only what stands alone is a disc's line then.
     let in_step = seen_at.into_iter().any(|mut places| {
         let samples: f64 = places.iter().map(|x| x.re).sum();
         transform.process(&mut places);
-        let line = places[LINES.start / 4..CELLS / 2].iter().map(|x| x.norm()).fold(0.0, f64::max);
-        line > IN_STEP * samples
+        let line = places[lines_looked_for.start / 4..CELLS / 2].iter().map(|x| x.norm()).fold(0.0, f64::max);
+        line > settings.in_step * samples
     });
     let mut lines = known;
     for (encoder, mut values) in series.into_iter().enumerate() {
@@ -86,34 +99,37 @@ pub fn search_lines(parts: &[Recording<'_>], nominal: &Nominal, known: [Option<f
             continue;
         }
         transform.process(&mut values);
-        let nats = |order: usize| values[order].norm_sqr() / power[encoder] - (LINES.len() as f64).ln();
-        let strongest = LINES.max_by(|a, b| nats(*a).total_cmp(&nats(*b))).unwrap_or(LINES.start);
+        let nats = |order: usize| values[order].norm_sqr() / power[encoder] - (lines_looked_for.len() as f64).ln();
+        let strongest =
+            lines_looked_for.clone().max_by(|a, b| nats(*a).total_cmp(&nats(*b))).unwrap_or(lines_looked_for.start);
         let harmonic = |order: usize| order.is_multiple_of(strongest) || strongest.is_multiple_of(order);
-        let apart = |order: &usize| order.abs_diff(strongest) > BESIDE && !harmonic(*order);
-        let alone = || LINES.filter(apart).all(|order| values[order].norm_sqr() < ALONE * values[strongest].norm_sqr());
-        if nats(strongest) > FOUND_NATS && (!in_step || alone()) {
+        let apart = |order: &usize| order.abs_diff(strongest) > settings.beside && !harmonic(*order);
+        let alone = || {
+            lines_looked_for
+                .clone()
+                .filter(apart)
+                .all(|order| values[order].norm_sqr() < settings.alone * values[strongest].norm_sqr())
+        };
+        if nats(strongest) > settings.found_nats && (!in_step || alone()) {
             // A wave of order 2 of the line may be the stronger one.
             let half = strongest / 2;
-            let of_half = strongest % 2 == 0 && half >= LINES.start && nats(half) > 0.0;
+            let of_half = strongest % 2 == 0 && half >= lines_looked_for.start && nats(half) > 0.0;
             lines[encoder] = Some(if of_half { half } else { strongest } as f64);
         }
     }
     lines
 }
 
-/// Angles looked at.
-const LOOKED_AT: usize = 4000;
-
 /// Counts a revolution of an angle that is read in whole counts; `None` where its steps have no common measure.
 #[must_use]
-pub fn counts_per_rev(theta_rad: &[f64]) -> Option<f64> {
+pub fn counts_per_rev(theta_rad: &[f64], settings: &LineSettings) -> Option<f64> {
     let steps: Vec<f64> = theta_rad
         .windows(2)
-        .take(LOOKED_AT)
+        .take(settings.counts_looked_at)
         .map(|pair| (pair[1] - pair[0]).abs())
         .filter(|step| step.is_finite() && *step > 1e-10)
         .collect();
-    if steps.len() < 20 {
+    if steps.len() < settings.counts_fewest {
         return None;
     }
     let mut sorted = steps.clone();
@@ -133,5 +149,5 @@ pub fn counts_per_rev(theta_rad: &[f64]) -> Option<f64> {
     let off = steps.iter().map(|step| (step / count_rad - (step / count_rad).round()).abs()).fold(0.0, f64::max);
     let counts = (TAU / count_rad).round();
     // A measure that nearly every step misses is none; a count under 1e-8 rad is rounding.
-    (off < 0.1 && count_rad > 1e-8 && counts > 10.0).then_some(counts)
+    (off < settings.counts_off && count_rad > 1e-8 && counts > 10.0).then_some(counts)
 }

@@ -3,7 +3,7 @@
 //! | step | file | what comes out |
 //! |---|---|---|
 //! | residual against the nominal model, by segments | `nominal`, `reduce`, `line_phase` | points, independent of the log's length |
-//! | revolutions × angle bins | `grid` | residual and station of every place |
+//! | revolutions × angle bins | `grid` | residual and operating point of every place |
 //! | columns of all effects and unknown patterns | `design_matrix`, `columns`, `nuisance_patterns` | sums from which every fit is made |
 //! | what does not repeat | `noise` | covariance by order, revolution and run |
 //! | how probable is a set of effects | `normal_equations`, `evidence`, `search` | models with their posterior |
@@ -31,26 +31,39 @@ pub mod nuisance_patterns;
 pub mod posterior;
 pub mod reduce;
 pub mod search;
+pub mod settings;
 mod slow_tone;
 pub mod summary;
 pub mod verify;
 
 mod columns;
 mod cross_validation;
+mod diagnose;
 mod documented;
-mod engine;
-mod events;
 mod experiment_design;
 mod ghosts;
 mod gram;
 mod interpolation;
+mod levels;
+mod line_errors;
+mod local_speed;
 mod localisation;
 mod normal_equations;
+mod options;
+mod pattern_words;
+mod report;
+mod runs;
 mod sectors;
+mod solve;
+mod steps;
+mod taken_off;
+mod tones;
 mod transients;
 mod waves;
 
 pub use campaign_logs::{CampaignLogs, ReducedLogs};
+pub use diagnose::{diagnose, diagnose_runs, diagnose_with_nominal};
 pub use diagnosis::Diagnosis;
-pub use engine::{GapError, Options, diagnose, diagnose_runs, diagnose_with_nominal};
 pub use nominal::Nominal;
+pub use options::{GapError, Options};
+pub use settings::Settings;

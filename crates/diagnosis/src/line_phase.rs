@@ -6,12 +6,10 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::settings::LineSettings;
+
 /// Waves: (encoder, order) × (sin, cos).
 pub(super) const WAVES: usize = 8;
-/// Fewest samples in a block.
-const BLOCK_SAMPLES: usize = 24;
-/// Fewest line periods in a block.
-const BLOCK_LINES: f64 = 4.0;
 
 /// Waves, driver angle and residual of a sample.
 type BlockSample = ([f64; WAVES], f64, f64);
@@ -20,6 +18,7 @@ type BlockSample = ([f64; WAVES], f64, f64);
 #[derive(Clone, Debug)]
 pub struct LinePhase {
     lines: [Option<f64>; 2],
+    settings: LineSettings,
     block: Vec<BlockSample>,
     origin: [f64; 2],
     /// Σ x xᵀ.
@@ -33,9 +32,10 @@ pub struct LinePhase {
 }
 
 impl LinePhase {
-    pub(super) fn new(lines: [Option<f64>; 2]) -> Self {
+    pub(super) fn new(lines: [Option<f64>; 2], settings: &LineSettings) -> Self {
         Self {
             lines,
+            settings: *settings,
             block: Vec::new(),
             origin: [0.0; 2],
             gram: SMatrix::zeros(),
@@ -70,7 +70,7 @@ impl LinePhase {
         let periods = |encoder: usize| {
             self.lines[encoder].map_or(f64::INFINITY, |lines| moved[encoder].abs() * lines / std::f64::consts::TAU)
         };
-        if self.block.len() >= BLOCK_SAMPLES && periods(0).min(periods(1)) >= BLOCK_LINES {
+        if self.block.len() >= self.settings.block_samples && periods(0).min(periods(1)) >= self.settings.block_lines {
             self.flush();
         }
         x
@@ -79,7 +79,7 @@ impl LinePhase {
     /// Books the block.
     pub(super) fn flush(&mut self) {
         let n = self.block.len() as f64;
-        if self.block.len() >= BLOCK_SAMPLES {
+        if self.block.len() >= self.settings.block_samples {
             let mean = |value: &dyn Fn(&BlockSample) -> f64| self.block.iter().map(value).sum::<f64>() / n;
             let (theta, rho) = (mean(&|s| s.1), mean(&|s| s.2));
             let spread: f64 = self.block.iter().map(|s| (s.1 - theta).powi(2)).sum();
@@ -135,7 +135,7 @@ impl LinePhase {
         let inverse = gram.try_inverse()?;
         let beta = inverse * products;
         let explained = products.dot(&beta);
-        if self.freedom < 50.0 || !explained.is_finite() {
+        if self.freedom < self.settings.fewest_freedom || !explained.is_finite() {
             return None;
         }
         let variance = ((self.squares - explained) / (self.freedom - 2.0)).max(f64::MIN_POSITIVE);

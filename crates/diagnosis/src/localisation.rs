@@ -8,13 +8,15 @@ use serde_json::json;
 use super::design_matrix::{Candidate, DesignMatrix};
 use super::diagnosis::{Curve, Location, Slice};
 use super::evidence::Fit;
-use super::grid::{Grid, nearest};
+use super::grid::Grid;
+use super::line_errors;
 use super::line_phase::LineError;
 use super::noise::Noise;
-use gearmodel::effect::{Accumulates, Carrier, INTERPOLATION, OperatingPoint, Parity, Rig, Signature, by_name};
+use super::settings::Settings;
+use gearmodel::effect::{Accumulates, Carrier, OperatingPoint, Parity, Rig, Signature, nearest_level};
 
 /// Sectors of a turn.
-const SECTORS: usize = 36;
+const LOCATION_SECTORS: usize = 36;
 /// Orders of a shaft.
 const ORDERS: usize = 12;
 /// Orders of the mesh.
@@ -26,7 +28,7 @@ const TIMES: usize = 24;
 pub(super) struct Inputs<'a> {
     pub(super) rig: &'a Rig,
     pub(super) grid: &'a Grid,
-    pub(super) pool: &'a DesignMatrix,
+    pub(super) design: &'a DesignMatrix,
     pub(super) noise: &'a Noise,
     pub(super) best: &'a Fit,
     pub(super) lines: &'a [LineError],
@@ -39,8 +41,9 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
     let rest: Vec<f64> = grid.rho_rad.iter().map(|y| y - zero).collect();
     let by =
         |key: &dyn Fn(&OperatingPoint) -> Option<usize>, names: &[serde_json::Value]| slices(inputs, &rest, key, names);
-    let sectors: Vec<_> = (0..SECTORS).map(|n| json!((n as f64 + 0.5) * 360.0 / SECTORS as f64)).collect();
-    let sector = |angle_rad: f64| ((angle_rad / TAU).rem_euclid(1.0) * SECTORS as f64) as usize;
+    let sectors: Vec<_> =
+        (0..LOCATION_SECTORS).map(|n| json!((n as f64 + 0.5) * 360.0 / LOCATION_SECTORS as f64)).collect();
+    let sector = |angle_rad: f64| ((angle_rad / TAU).rem_euclid(1.0) * LOCATION_SECTORS as f64) as usize;
     let teeth = rig.pair().teeth().0 as usize;
     let tooth_names: Vec<_> = (0..teeth).map(|n| json!(n)).collect();
     let loads: Vec<_> = grid.plan.loads_nm.iter().map(|x| json!(x)).collect();
@@ -85,8 +88,8 @@ pub(super) fn locate(inputs: &Inputs<'_>) -> Location {
             })
             .collect(),
         direction: by(&|at| Some(usize::from(at.sense < 0.0)), &[json!("ccw"), json!("cw")]),
-        load: by(&|at| Some(nearest(&grid.plan.loads_nm, at.load_nm)), &loads),
-        speed: by(&|at| Some(nearest(&grid.plan.speeds_rad_per_s, at.speed_rad_per_s.abs())), &speeds),
+        load: by(&|at| Some(nearest_level(&grid.plan.loads_nm, at.load_nm)), &loads),
+        speed: by(&|at| Some(nearest_level(&grid.plan.speeds_rad_per_s, at.speed_rad_per_s.abs())), &speeds),
         revolution: by(&|at| Some(at.way_rev as usize), &(0..revolutions).map(|n| json!(n)).collect::<Vec<_>>()),
         time: by(&|at| Some(time(at)), &times),
     }
@@ -138,11 +141,11 @@ fn amplitude(grid: &Grid, rest: &[f64], phase: &dyn Fn(&OperatingPoint) -> f64) 
 /// The signature: the row of the largest effect or unknown pattern in the best model, freed of what the plan cannot tell; that of
 /// nothing where there is none.
 fn signature(inputs: &Inputs<'_>) -> Signature {
-    let Inputs { rig, grid, pool, best, lines, .. } = inputs;
+    let Inputs { rig, grid, design, best, lines, .. } = inputs;
     let mut largest: Option<(f64, Signature)> = None;
     for (n, b) in best.set.iter().enumerate() {
-        let size = best.rms_rad(pool, n).powi(2);
-        let row = match &pool.blocks[*b].cause {
+        let size = best.rms_rad(design, n).powi(2);
+        let row = match &design.blocks[*b].candidate {
             Candidate::Effect { effect, shape, .. } => effect.signature_of(rig, shape),
             Candidate::Unknown(pattern) => pattern.signature(),
         };
@@ -152,7 +155,7 @@ fn signature(inputs: &Inputs<'_>) -> Signature {
     }
     for line in *lines {
         let size = line.explained_rad2 / grid.samples;
-        if let Some(effect) = by_name(INTERPOLATION[line.encoder])
+        if let Some(effect) = line_errors::effect_of(line.encoder)
             && largest.as_ref().is_none_or(|(s, _)| size > *s)
         {
             largest = Some((size, effect.signature()));
@@ -173,7 +176,7 @@ fn signature(inputs: &Inputs<'_>) -> Signature {
 }
 
 /// What this data does not allow one to conclude.
-pub(super) fn warnings(grid: &Grid, noise: &Noise) -> Vec<String> {
+pub(super) fn warnings(grid: &Grid, noise: &Noise, settings: &Settings) -> Vec<String> {
     let plan = &grid.plan;
     let mut warnings = Vec::new();
     if plan.senses != [true, true] {
@@ -203,21 +206,21 @@ pub(super) fn warnings(grid: &Grid, noise: &Noise) -> Vec<String> {
              record at least 3 revolutions a run"
                 .to_owned(),
         );
-    } else if noise.freedom < 40.0 {
+    } else if noise.freedom < settings.report.few_differences {
         warnings.push(
             "few revolutions were recorded: repeatability is known roughly, and so are the probabilities".to_owned(),
         );
     }
-    if grid.revolutions.iter().all(|r| r.coverage < 0.9) {
+    if grid.revolutions.iter().all(|r| r.coverage < settings.noise.full_coverage) {
         warnings.push("no revolution is complete: orders of the shafts cannot be told apart well".to_owned());
     }
     warnings
 }
 
 /// Residual over the turn before and after, run by run.
-pub(super) fn curves(grid: &Grid, pool: &DesignMatrix, best: &Fit) -> Vec<Curve> {
+pub(super) fn curves(grid: &Grid, design: &DesignMatrix, best: &Fit) -> Vec<Curve> {
     let zero = best.mean[0];
-    let trace = pool.trace(grid, &best.amplitudes());
+    let trace = design.trace(grid, &best.amplitudes());
     let mut curves = Vec::new();
     for (run, direction) in grid.directions.iter().enumerate() {
         let mut sums = vec![(0.0, 0.0, 0.0); grid.bins];

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::campaign_logs::CampaignLogs;
 use crate::verify::{Verified, verify};
-use crate::{Diagnosis, GapError, Nominal, Options, diagnose_runs};
+use crate::{Diagnosis, GapError, Nominal, Options, Settings, diagnose_runs};
 
 /// Why logs are not diagnosed.
 #[derive(Debug, Error)]
@@ -93,7 +93,7 @@ impl Logs {
     /// # Errors
     /// [`LogsError`] when a log breaks off in the middle of a message or the data is too little.
     pub fn diagnose(&self, options: &Options) -> Result<Diagnosed, LogsError> {
-        let reduced = self.logs.reduce(&self.nominal)?;
+        let reduced = self.logs.reduce(&self.nominal, &options.settings)?;
         let incomplete = reduced.incomplete();
         let diagnosis = diagnose_runs(&self.nominal, reduced.runs, options)?;
         Ok(Diagnosed { diagnosis, incomplete })
@@ -104,7 +104,7 @@ impl Logs {
     /// # Errors
     /// [`LogsError`] when a log breaks off in the middle of a message.
     pub fn verify(&self) -> Result<(Option<Verified>, Vec<String>), LogsError> {
-        let reduced = self.logs.reduce(&self.nominal)?;
+        let reduced = self.logs.reduce(&self.nominal, &Settings::default())?;
         let incomplete = reduced.incomplete();
         let runs = reduced.runs.into_iter().map(|(run, _)| run).collect();
         Ok((verify(&self.nominal, runs), incomplete))

@@ -4,7 +4,7 @@
 //! turn, 0 … 8, and what goes from one level to the next within a revolution: a ramp, alone and on order 1. Wave n has
 //! variance λ_n between revolutions and κ λ_n between runs (κ of the level its own), white noise σ²/samples. With
 //! Z the waves at the places, V = σ²W⁻¹ + Z Λ Zᵀ (+ the same across a run), inverted by Woodbury's identity on the sums
-//! of the pool. Samples are not independent: treated as such, a null campaign shows false effects more often than not.
+//! of the design matrix. Samples are not independent: treated as such, a null campaign shows false effects more often than not.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -15,17 +15,8 @@ use rayon::prelude::*;
 
 use super::design_matrix::DesignMatrix;
 use super::grid::Grid;
+use super::settings::NoiseSettings;
 use super::waves::{KINDS, ORDERS, STEADY, WAVES, kind, members, waves};
-
-/// Least scatter taken of an order, rad: a hundredth of the finest rig's.
-const LEAST_SCATTER_RAD: f64 = 3e-8;
-/// Variance of a ramp in parts of that of what it goes with.
-const RAMP: f64 = 0.2;
-/// Coverage from which a revolution's waves are well determined.
-const FULL: f64 = 0.9;
-
-/// Scatter between runs over that between revolutions before anything is known: of the level, and of the other waves.
-pub(super) const FIRST_RUN_RATIO: [f64; 2] = [1.0, 0.3];
 
 /// Variances of the noise.
 #[derive(Clone, Debug)]
@@ -38,13 +29,15 @@ pub struct Noise {
     pub run_ratio: [f64; 2],
     /// Independent differences from which the revolutions' scatter was estimated; 0 where it was assumed.
     pub freedom: f64,
+    /// Least scatter taken of an order, rad.
+    least_rad: f64,
     /// How the waves of every revolution are whitened.
     revolutions: Arc<Vec<Option<Passing>>>,
 }
 
 /// Everything a fit needs under one noise.
 pub struct Whitened {
-    /// XᵀV⁻¹X of all columns of the pool.
+    /// XᵀV⁻¹X of all columns of the design matrix.
     pub gram: DMatrix<f64>,
     /// log det V + constant.
     pub log_det: f64,
@@ -80,8 +73,8 @@ impl Noise {
     /// Estimates the scatter from what differs between revolutions of a run after the model `amplitudes` (column,
     /// amplitude) is taken off.
     #[must_use]
-    pub fn estimate(grid: &Grid, pool: &DesignMatrix, amplitudes: &[(usize, f64)]) -> Self {
-        let residual_waves: Vec<_> = pool
+    pub fn estimate(grid: &Grid, design: &DesignMatrix, amplitudes: &[(usize, f64)], settings: &NoiseSettings) -> Self {
+        let residual_waves: Vec<_> = design
             .waves
             .iter()
             .map(|c| {
@@ -95,16 +88,16 @@ impl Noise {
         let fitted: Vec<Option<_>> = grid
             .revolutions
             .iter()
-            .zip(pool.wave_products())
+            .zip(design.wave_products())
             .zip(&residual_waves)
             .map(|((revolution, k), e)| {
                 // Without the ramps: over a whole turn they are nearly sums of the orders.
                 let (k, e) = (k.view((0, 0), (STEADY, STEADY)).into_owned(), e.rows(0, STEADY).into_owned());
-                (revolution.coverage >= FULL).then(|| Cholesky::new(k).map(|c| c.solve(&e))).flatten()
+                (revolution.coverage >= settings.full_coverage).then(|| Cholesky::new(k).map(|c| c.solve(&e))).flatten()
             })
             .collect();
-        let rest = pool.rest(grid, amplitudes);
-        let (white_rad2, weight) = white(grid, &fitted, &rest);
+        let rest = design.rest(grid, amplitudes);
+        let (white_rad2, weight) = white(grid, &fitted, &rest, settings);
         // Squared differences between neighbouring revolutions, by order.
         let mut squares: Vec<Vec<f64>> = vec![Vec::new(); ORDERS + 1];
         let of_white = white_rad2 / weight.max(1.0);
@@ -117,12 +110,16 @@ impl Noise {
                 .filter_map(|pair| Some(fitted[pair[1]].as_ref()? - fitted[pair[0]].as_ref()?))
                 .collect();
             // What grows evenly is drift, not scatter: where there are enough differences their mean is taken off order 0.
-            let mean = if differences.len() >= 3 {
+            let mean = if differences.len() >= settings.drift_differences {
                 differences.iter().map(|d| d[0]).sum::<f64>() / differences.len() as f64
             } else {
                 0.0
             };
-            let shrink = if differences.len() >= 3 { 1.0 - 1.0 / differences.len() as f64 } else { 1.0 };
+            let shrink = if differences.len() >= settings.drift_differences {
+                1.0 - 1.0 / differences.len() as f64
+            } else {
+                1.0
+            };
             for difference in &differences {
                 squares[0].push((difference[0] - mean).powi(2) / shrink);
                 for wave in 1..STEADY {
@@ -132,20 +129,27 @@ impl Noise {
         }
         let mut order_rad2 = [0.0; KINDS];
         for (variance, squares) in order_rad2.iter_mut().zip(&mut squares) {
-            *variance = scatter(squares, of_white);
+            *variance = scatter(squares, of_white, settings);
         }
         let freedom = squares.iter().map(Vec::len).sum::<usize>() as f64;
         if freedom == 0.0 {
             // One revolution a run: nothing says how well it repeats. As much scatter as white noise in a tenth of a turn.
-            order_rad2 = std::array::from_fn(|n| 10.0 * of_white / (1.0 + n as f64));
+            order_rad2 = std::array::from_fn(|n| settings.assumed_of_white * of_white / (1.0 + n as f64));
         }
         // A level that changes from turn to turn changes within them too.
-        order_rad2[ORDERS + 1] = RAMP * order_rad2[0];
-        order_rad2[ORDERS + 2] = RAMP * order_rad2[1];
-        let wave_rad2 = wave_rad2(&order_rad2);
+        order_rad2[ORDERS + 1] = settings.ramp * order_rad2[0];
+        order_rad2[ORDERS + 2] = settings.ramp * order_rad2[1];
+        let wave_rad2 = wave_rad2(&order_rad2, settings.least_rad);
         let passing = |k: &DMatrix<f64>| Passing::new(&(k / white_rad2), &wave_rad2);
-        let revolutions = Arc::new(pool.wave_products().par_iter().map(passing).collect());
-        Self { white_rad2, order_rad2, run_ratio: FIRST_RUN_RATIO, freedom, revolutions }
+        let revolutions = Arc::new(design.wave_products().par_iter().map(passing).collect());
+        Self {
+            white_rad2,
+            order_rad2,
+            run_ratio: settings.first_run_ratio,
+            freedom,
+            revolutions,
+            least_rad: settings.least_rad,
+        }
     }
 
     /// RMS of what does not repeat, as a sample shows it, rad.
@@ -158,8 +162,8 @@ impl Noise {
 
     /// XᵀV⁻¹X and log det V.
     #[must_use]
-    pub fn whiten(&self, grid: &Grid, pool: &DesignMatrix) -> Whitened {
-        self.within_runs(grid, pool, None).between_runs(self.run_ratio)
+    pub fn whiten(&self, grid: &Grid, design: &DesignMatrix) -> Whitened {
+        self.within_runs(grid, design, None).between_runs(self.run_ratio)
     }
 
     /// How the waves of a revolution are whitened.
@@ -169,17 +173,17 @@ impl Noise {
 
     /// How what revolutions pass on to their run is whitened there; `left` is the sum of theirs.
     pub(super) fn run(&self, left: &DMatrix<f64>) -> Option<Passing> {
-        Passing::new(left, &between(&wave_rad2(&self.order_rad2), self.run_ratio))
+        Passing::new(left, &between(&wave_rad2(&self.order_rad2, self.least_rad), self.run_ratio))
     }
 
     /// Everything that does not depend on the scatter between runs, of all columns or of some.
     #[must_use]
-    pub(super) fn within_runs(&self, grid: &Grid, pool: &DesignMatrix, only: Option<&[usize]>) -> WithinRuns {
+    pub(super) fn within_runs(&self, grid: &Grid, design: &DesignMatrix, only: Option<&[usize]>) -> WithinRuns {
         let precision = 1.0 / self.white_rad2;
-        let wave_rad2 = wave_rad2(&self.order_rad2);
+        let wave_rad2 = wave_rad2(&self.order_rad2, self.least_rad);
         let mut gram = match only {
-            None => pool.products.clone(),
-            Some(columns) => pool.products.select_rows(columns).select_columns(columns),
+            None => design.products.clone(),
+            Some(columns) => design.products.select_rows(columns).select_columns(columns),
         };
         gram *= precision;
         let p = gram.ncols();
@@ -192,8 +196,8 @@ impl Noise {
             let Some(passing) = self.revolution(number) else { continue };
             log_det += passing.log_det;
             let c = match only {
-                None => &pool.waves[number] * precision,
-                Some(columns) => pool.waves[number].select_columns(columns) * precision,
+                None => &design.waves[number] * precision,
+                Some(columns) => design.waves[number].select_columns(columns) * precision,
             };
             left[revolution.run] += &passing.left;
             waves[revolution.run].gemm(1.0, &passing.on, &c, 1.0);
@@ -205,8 +209,8 @@ impl Noise {
 }
 
 /// Variance of every wave between revolutions, rad².
-fn wave_rad2(order_rad2: &[f64; KINDS]) -> Vec<f64> {
-    (0..WAVES).map(|w| order_rad2[kind(w)].max(LEAST_SCATTER_RAD * LEAST_SCATTER_RAD)).collect()
+fn wave_rad2(order_rad2: &[f64; KINDS], least_rad: f64) -> Vec<f64> {
+    (0..WAVES).map(|w| order_rad2[kind(w)].max(least_rad * least_rad)).collect()
 }
 
 /// Variance of every wave between runs.
@@ -274,7 +278,7 @@ impl WithinRuns {
 
 /// White noise a sample, rad², from places of neighbouring revolutions of a run freed of their waves; from neighbouring places
 /// where runs have one revolution. With it the mean sum of weights of a revolution.
-fn white(grid: &Grid, fitted: &[Option<nalgebra::DVector<f64>>], rest: &[f64]) -> (f64, f64) {
+fn white(grid: &Grid, fitted: &[Option<nalgebra::DVector<f64>>], rest: &[f64], settings: &NoiseSettings) -> (f64, f64) {
     let mut squares = 0.0;
     let mut count = 0.0;
     let closes = grid.cells.len() < grid.places.len();
@@ -301,7 +305,7 @@ fn white(grid: &Grid, fitted: &[Option<nalgebra::DVector<f64>>], rest: &[f64]) -
         }
     }
     let weight = grid.weight.iter().sum::<f64>() / grid.revolutions.len().max(1) as f64;
-    if count < 100.0 {
+    if count < settings.fewest_pairs {
         // Second differences along the turn: blind to what is smooth over three bins.
         (squares, count) = (0.0, 0.0);
         for revolution in &grid.revolutions {
@@ -313,13 +317,13 @@ fn white(grid: &Grid, fitted: &[Option<nalgebra::DVector<f64>>], rest: &[f64]) -
             }
         }
     }
-    let floor = 1e-9_f64;
+    let floor = settings.least_white_rad;
     ((squares / f64::max(count, 1.0)).max(floor * floor), weight)
 }
 
 /// Variance from squared differences of two: robust against few large ones (steps, knocks), less what is white noise's.
-fn scatter(squares: &mut [f64], of_white: f64) -> f64 {
-    let least = LEAST_SCATTER_RAD * LEAST_SCATTER_RAD;
+fn scatter(squares: &mut [f64], of_white: f64, settings: &NoiseSettings) -> f64 {
+    let least = settings.least_rad * settings.least_rad;
     if squares.is_empty() {
         return least;
     }
@@ -327,6 +331,7 @@ fn scatter(squares: &mut [f64], of_white: f64) -> f64 {
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
     // Median of χ²(1) is 0.4549.
     let middle = 0.5 * (squares[(squares.len() - 1) / 2] + squares[squares.len() / 2]) / 0.4549;
-    let robust = if squares.len() >= 8 { mean.min(2.0 * middle) } else { mean };
-    (0.5 * robust - of_white).max(0.02 * of_white).max(least)
+    let robust =
+        if squares.len() >= settings.robust_differences { mean.min(settings.robust_factor * middle) } else { mean };
+    (0.5 * robust - of_white).max(settings.least_of_white * of_white).max(least)
 }

@@ -1,14 +1,17 @@
-//! NormalEquations equations of a set of blocks: amplitudes, their covariance and the evidence under any prior variances.
+//! Normal equations of a set of blocks: amplitudes, their covariance and the evidence under any prior variances.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
-use super::design_matrix::{Block, RESIDUAL, WIDE};
+use super::design_matrix::{Block, RESIDUAL};
 use super::noise::Whitened;
 
-/// NormalEquations equations of a set, the columns of its widest block turned to where their part is diagonal: they then cost no more than a
+/// Blocks of more columns than this are worth turning.
+const TURNED: usize = 16;
+
+/// Normal equations of a set, the columns of its widest block turned to where their part is diagonal: they then cost no more than a
 /// diagonal does, however often the scales are moved.
 pub(super) struct NormalEquations {
     /// Columns of the set that are turned.
@@ -60,7 +63,7 @@ impl NormalEquations {
 
     /// Of a set with these columns.
     pub(super) fn new(blocks: &[Block], whitened: &Whitened, set: &[usize], columns: &[usize]) -> Self {
-        let widest = set.iter().map(|b| &blocks[*b]).filter(|b| b.width() > WIDE).max_by_key(|b| b.width());
+        let widest = set.iter().map(|b| &blocks[*b]).filter(|b| b.width() > TURNED).max_by_key(|b| b.width());
         let Some(block) = widest else {
             let (gram, rhs) = select(&whitened.gram, columns);
             return Self::dense(gram, rhs);

@@ -3,35 +3,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use gearmodel::effect::{Accumulates, Carrier, OperatingPoint, Parity, Plan, Shaft, Signature};
-
-/// Part of its turn that a shaft must cover for its orders to be tried.
-const LEAST_TURN: f64 = 0.9;
-/// Highest order of a shaft that is always tried.
-pub(super) const HIGHEST_ORDER: usize = 8;
-/// Highest order of waves that do not close with the turn.
-const HIGHEST_WANDERING: f64 = 3.5;
-
-/// Orders of a smooth pattern.
-const SMOOTH_ORDERS: usize = 18;
-
-/// What a wave that does not close with the turn costs, nats: it was chosen from many, and the scatter of the low orders runs on from
-/// turn to turn as such waves do.
-const WANDERING_COST_NATS: f64 = 12.0;
-
-/// Time constants of settling tried, and the ratio of neighbours.
-const SETTLING_TIMES: usize = 8;
-const SETTLING_RATIO: f64 = 1.5;
-/// Fewest and most terms of a random walk.
-const LEAST_TERMS: usize = 6;
-const MOST_TERMS: usize = 48;
-/// What a level that runs on with time costs, nats: scatter does too, a little.
-const RUNNING_ON_COST_NATS: f64 = 6.0;
-
-/// What an order that was chosen from all high ones costs, nats.
-const GHOST_COST_NATS: f64 = 4.0;
-/// The same of each further one that goes with it, nats.
-const ANOTHER_GHOST_COST_NATS: f64 = 1.0;
+use super::settings::{NuisanceSettings, RunningOnSettings, Settings};
+use gearmodel::effect::{OperatingPoint, Plan, Shaft};
 
 /// How a pattern scales with the condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +59,8 @@ pub enum Pattern {
     Smooth {
         /// Sense.
         sense: f64,
+        /// Orders, from the first on.
+        orders: usize,
     },
     /// A constant that scales with the condition.
     Level {
@@ -132,14 +107,15 @@ pub enum Pattern {
 }
 
 /// Step of wandering waves' orders: a part of what the angle covered tells apart.
-fn order_step(span_rev: f64) -> f64 {
-    (0.4 / span_rev.max(1.0)).clamp(0.02, 0.2)
+fn order_step(span_rev: f64, settings: &NuisanceSettings) -> f64 {
+    let [least, largest] = settings.wandering_steps;
+    (settings.wandering_step / span_rev.max(1.0)).clamp(least, largest)
 }
 
 impl Pattern {
     /// The patterns tried under a plan.
     #[must_use]
-    pub fn all(plan: &Plan) -> Vec<Self> {
+    pub fn all(plan: &Plan, settings: &NuisanceSettings) -> Vec<Self> {
         let mut patterns = Vec::new();
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
         let both = plan.senses == [true, true];
@@ -147,7 +123,7 @@ impl Pattern {
         let shafts: Vec<Shaft> = [Shaft::Input, Shaft::Output]
             .into_iter()
             .zip(plan.turns)
-            .filter(|(_, turns)| *turns > LEAST_TURN)
+            .filter(|(_, turns)| *turns > settings.least_turn)
             .map(|(shaft, _)| shaft)
             .collect();
         let parities: &[bool] = if both { &[false, true] } else { &[false] };
@@ -167,7 +143,7 @@ impl Pattern {
                     patterns.push(Self::Level { odd, weight, mean });
                 }
                 for &shaft in &shafts {
-                    for order in 1..=HIGHEST_ORDER as u32 {
+                    for order in 1..=settings.highest_order as u32 {
                         patterns.push(Self::Order { shaft, order: f64::from(order), odd, weight, mean });
                     }
                 }
@@ -177,10 +153,10 @@ impl Pattern {
             patterns.push(Self::Level { odd: true, weight: Weight::One, mean: 1.0 });
             for sense in [1.0, -1.0] {
                 if shafts.contains(&Shaft::Input) {
-                    patterns.push(Self::Smooth { sense });
+                    patterns.push(Self::Smooth { sense, orders: settings.smooth_orders });
                 }
                 for &shaft in &shafts {
-                    for order in 1..=4 {
+                    for order in 1..=settings.highest_one_sense {
                         patterns.push(Self::OneSense { shaft, order, sense });
                     }
                 }
@@ -194,9 +170,9 @@ impl Pattern {
 
     /// Waves over the driver's angle that do not close with its turn: a grid of orders as fine as the angle covered tells apart.
     #[must_use]
-    pub fn wandering(span_rev: f64) -> Vec<Self> {
-        let step = order_step(span_rev);
-        let count = (HIGHEST_WANDERING / step) as usize;
+    pub fn wandering(span_rev: f64, settings: &NuisanceSettings) -> Vec<Self> {
+        let step = order_step(span_rev, settings);
+        let count = (settings.highest_wandering / step) as usize;
         (1..=count)
             .map(|n| n as f64 * step)
             .filter(|order| (order - order.round()).abs() > 0.25 * step || *order < 0.9)
@@ -206,26 +182,26 @@ impl Pattern {
 
     /// Levels that run on with time: those that settle in each run, from a fortieth of a run to half of it, and a random walk.
     #[must_use]
-    pub fn running_on(plan: &Plan) -> (Vec<Self>, Option<Self>) {
+    pub fn running_on(plan: &Plan, settings: &RunningOnSettings) -> (Vec<Self>, Option<Self>) {
         let run_s = plan.duration_s / plan.runs.max(1) as f64;
-        let settling = (0..SETTLING_TIMES).map(|n| Self::Settling {
-            tau_s: 0.5 * run_s / SETTLING_RATIO.powf(n as f64),
+        let settling = (0..settings.settling_times).map(|n| Self::Settling {
+            tau_s: 0.5 * run_s / settings.settling_ratio.powf(n as f64),
             starts_s: plan.starts_s.clone(),
         });
-        let terms = (plan.revolutions as usize).min(MOST_TERMS);
-        let walk = (terms >= LEAST_TERMS).then_some(Self::RandomWalk { terms, duration_s: plan.duration_s });
+        let terms = (plan.revolutions as usize).min(settings.most_terms);
+        let walk = (terms >= settings.least_terms).then_some(Self::RandomWalk { terms, duration_s: plan.duration_s });
         (settling.collect(), walk)
     }
 
     /// The same with its order or time constant closer about its own, a step being a part of the grid's; none where it has neither.
     #[must_use]
-    pub fn nearer(&self, step: f64, span_rev: f64) -> Vec<Self> {
+    pub fn nearer(&self, step: f64, span_rev: f64, settings: &Settings) -> Vec<Self> {
         match self {
             Self::Order { shaft, order, odd, weight, mean } if order.fract() != 0.0 => [-0.5, -0.25, 0.25, 0.5]
                 .into_iter()
                 .map(|part| Self::Order {
                     shaft: *shaft,
-                    order: order + part * step * order_step(span_rev),
+                    order: order + part * step * order_step(span_rev, &settings.nuisance),
                     odd: *odd,
                     weight: *weight,
                     mean: *mean,
@@ -234,7 +210,7 @@ impl Pattern {
             Self::Settling { tau_s, starts_s } => [-0.5, 0.5]
                 .into_iter()
                 .map(|part: f64| Self::Settling {
-                    tau_s: tau_s * SETTLING_RATIO.powf(part * step),
+                    tau_s: tau_s * settings.running_on.settling_ratio.powf(part * step),
                     starts_s: starts_s.clone(),
                 })
                 .collect(),
@@ -255,7 +231,7 @@ impl Pattern {
                 }
             }
             Self::Level { .. } | Self::Step { .. } => 1,
-            Self::Smooth { .. } => 2 * SMOOTH_ORDERS,
+            Self::Smooth { orders, .. } => 2 * orders,
             Self::Comb { orders, .. } => 2 * orders.len(),
             Self::RunLevels { runs } => runs - 1,
             Self::Settling { starts_s, .. } => starts_s.len(),
@@ -265,14 +241,16 @@ impl Pattern {
 
     /// What it costs that it was chosen from many, nats.
     #[must_use]
-    pub fn cost_nats(&self) -> f64 {
+    pub fn cost_nats(&self, settings: &Settings) -> f64 {
         match self {
             // The grid of orders and those between.
-            Self::Order { order, .. } if order.fract() != 0.0 => WANDERING_COST_NATS,
-            Self::Settling { .. } | Self::RandomWalk { .. } | Self::Tone { .. } => RUNNING_ON_COST_NATS,
-            Self::Order { order, .. } if *order > HIGHEST_ORDER as f64 => GHOST_COST_NATS,
+            Self::Order { order, .. } if order.fract() != 0.0 => settings.nuisance.wandering_cost_nats,
+            Self::Settling { .. } | Self::RandomWalk { .. } | Self::Tone { .. } => settings.running_on.cost_nats,
+            Self::Order { order, .. } if *order > settings.nuisance.highest_order as f64 => settings.ghosts.cost_nats,
             Self::Step { cost_nats, .. } => *cost_nats,
-            Self::Comb { orders, .. } => GHOST_COST_NATS + ANOTHER_GHOST_COST_NATS * (orders.len() as f64 - 1.0),
+            Self::Comb { orders, .. } => {
+                settings.ghosts.cost_nats + settings.ghosts.another_cost_nats * (orders.len() as f64 - 1.0)
+            }
             _ => 0.0,
         }
     }
@@ -320,7 +298,7 @@ impl Pattern {
         }
     }
 
-    /// Values at a station.
+    /// Values at an operating point.
     pub fn row(&self, at: &OperatingPoint, row: &mut [f64]) {
         let scale = |weight: Weight, mean: f64, odd: bool| {
             let size = match weight {
@@ -349,7 +327,7 @@ impl Pattern {
                     }
                 }
             }
-            Self::Smooth { sense } => {
+            Self::Smooth { sense, .. } => {
                 if at.sense * sense > 0.0 {
                     for (order, columns) in (1_u32..).zip(row.chunks_exact_mut(2)) {
                         at.wave(Shaft::Input, f64::from(order), 1.0, columns);
@@ -379,74 +357,6 @@ impl Pattern {
                     let k = (n as f64 + 0.5) * PI;
                     *column = (k * at.time_s / duration_s).sin() / k;
                 }
-            }
-        }
-    }
-
-    /// In words.
-    #[must_use]
-    pub fn describe(&self) -> String {
-        let shaft_name = |shaft: &Shaft| if *shaft == Shaft::Input { "driver" } else { "driven shaft" };
-        let scaled = |odd: bool, weight: Weight| {
-            let size = match weight {
-                Weight::One => "at any load and speed",
-                Weight::Load => "growing with the load",
-                Weight::Speed => "growing with the speed",
-                Weight::Time => "changing with time",
-            };
-            format!("{}, {size}", if odd { "opposite in the two senses" } else { "alike in both senses" })
-        };
-        match self {
-            Self::Order { shaft, order, odd, weight, .. } => {
-                format!("order {order} of the {}, {}", shaft_name(shaft), scaled(*odd, *weight))
-            }
-            Self::Comb { shaft, orders, odd, .. } => {
-                let orders: Vec<String> = orders.iter().map(ToString::to_string).collect();
-                let parity = scaled(*odd, Weight::One);
-                format!("orders {} of the {}, {parity}", orders.join(", "), shaft_name(shaft))
-            }
-            Self::OneSense { shaft, order, sense } => {
-                let sense = if *sense > 0.0 { "ccw" } else { "cw" };
-                format!("order {order} of the {} when driving {sense} only", shaft_name(shaft))
-            }
-            Self::Smooth { sense } => {
-                let sense = if *sense > 0.0 { "ccw" } else { "cw" };
-                format!("a smooth pattern over the driver's turn when driving {sense} only")
-            }
-            Self::Level { odd, weight, .. } => format!("an offset, {}", scaled(*odd, *weight)),
-            Self::RunLevels { .. } => "an offset that differs from run to run".to_owned(),
-            Self::Tone { frequency_hz } => format!("a tone of {frequency_hz:.4} Hz in time"),
-            Self::Step { time_s, until_s, .. } if until_s.is_finite() => {
-                format!("a step at {time_s:.2} s and back at {until_s:.2} s")
-            }
-            Self::Step { time_s, .. } => format!("a step at {time_s:.2} s"),
-            Self::Settling { tau_s, .. } => format!("a level that settles anew in each run, within about {tau_s:.1} s"),
-            Self::RandomWalk { .. } => "a level that wanders with time".to_owned(),
-        }
-    }
-
-    /// Its signature row.
-    #[must_use]
-    pub fn signature(&self) -> Signature {
-        let parity_of = |odd: bool| if odd { Parity::Odd } else { Parity::Even };
-        let scaled = |carrier, odd, weight| {
-            let steady = Signature::steady(carrier, parity_of(odd));
-            match weight {
-                Weight::One => steady,
-                Weight::Load => steady.with_load(1.0),
-                Weight::Speed => steady.with_speed(Some(1.0)),
-                Weight::Time => steady.accumulating(Accumulates::PerTime),
-            }
-        };
-        match self {
-            Self::Order { shaft, odd, weight, .. } => scaled(shaft.carrier(), *odd, *weight),
-            Self::Comb { shaft, odd, .. } => scaled(shaft.carrier(), *odd, Weight::One),
-            Self::OneSense { shaft, .. } => Signature::steady(shaft.carrier(), Parity::OneFlank),
-            Self::Smooth { .. } => Signature::steady(Carrier::Input, Parity::OneFlank),
-            Self::Level { odd, weight, .. } => scaled(Carrier::None, *odd, *weight),
-            Self::RunLevels { .. } | Self::Step { .. } => Signature::steady(Carrier::None, Parity::Mixed),
-            Self::Tone { .. } | Self::Settling { .. } | Self::RandomWalk { .. } => {
-                Signature::steady(Carrier::Time, Parity::Mixed)
             }
         }
     }

@@ -1,19 +1,16 @@
 //! Posterior over models → probabilities of effects, groups and the unknown.
 
-use nalgebra::DMatrix;
+use nalgebra::{Cholesky, DMatrix};
 
 use super::design_matrix::ZERO;
 use super::design_matrix::{Block, Candidate, DesignMatrix};
 use super::noise::Whitened;
 use super::search::Model;
+use super::settings::ReportSettings;
 use gearmodel::effect::LIBRARY;
 
-/// Subspaces nearer than this cannot be told apart, deg.
-pub const SAME_DEG: f64 = 2.0;
-/// Members of a group may be this much less probable than the best, nats.
-const MEMBER_NATS: f64 = 6.0;
-/// Blocks this much wider than another describe more than it: not a group.
-const MUCH_WIDER: usize = 8;
+/// Ridge of the Gram matrix of a sum of two blocks.
+const SUM_RIDGE: f64 = 1e-10;
 
 /// Probabilities from all models seen.
 #[derive(Clone, Debug)]
@@ -29,7 +26,7 @@ pub struct Posterior {
 }
 
 fn number(block: &Block) -> Option<usize> {
-    match &block.cause {
+    match &block.candidate {
         Candidate::Effect { number, .. } => Some(*number),
         Candidate::Unknown(_) => None,
     }
@@ -37,7 +34,7 @@ fn number(block: &Block) -> Option<usize> {
 
 /// Posterior of effects. `sharpness` under 1 flattens what the noise model's own error makes too sure.
 #[must_use]
-pub fn posterior(pool: &DesignMatrix, models: &[Model], sharpness: f64) -> Posterior {
+pub fn posterior(design: &DesignMatrix, models: &[Model], sharpness: f64) -> Posterior {
     let best = models.first().map_or(0.0, |m| m.score);
     let mut weights: Vec<f64> = models.iter().map(|m| (sharpness * (m.score - best)).exp()).collect();
     let total: f64 = weights.iter().sum();
@@ -48,7 +45,7 @@ pub fn posterior(pool: &DesignMatrix, models: &[Model], sharpness: f64) -> Poste
     for (model, weight) in models.iter().zip(&weights) {
         let mut outside = false;
         for b in &model.fit.set {
-            match number(&pool.blocks[*b]) {
+            match number(&design.blocks[*b]) {
                 Some(n) => {
                     probability[n] += weight;
                     // Models come best first.
@@ -64,52 +61,71 @@ pub fn posterior(pool: &DesignMatrix, models: &[Model], sharpness: f64) -> Poste
     Posterior { probability, block, unknown, weights }
 }
 
-/// Largest principal angle between two blocks' subspaces, of the smaller one's directions, as the noise weighs them and with
-/// the zero free, deg.
+/// Largest principal angle between two blocks' subspaces, of the smaller one's directions, deg.
 #[must_use]
-pub fn angle_deg(pool: &DesignMatrix, whitened: &Whitened, a: usize, b: usize) -> f64 {
-    let (a, b) = (&pool.blocks[a], &pool.blocks[b]);
+pub fn angle_deg(design: &DesignMatrix, whitened: &Whitened, a: usize, b: usize) -> f64 {
+    let columns = |block: usize| design.blocks[block].columns.clone().collect::<Vec<_>>();
+    principal_angle_deg(whitened, &columns(a), &columns(b), 0.0)
+}
+
+/// Largest principal angle from a block to the sum of two others, deg.
+#[must_use]
+pub(super) fn angle_to_sum_deg(design: &DesignMatrix, whitened: &Whitened, target: usize, a: usize, b: usize) -> f64 {
+    let columns = |block: usize| design.blocks[block].columns.clone();
+    let sum: Vec<usize> = columns(a).chain(columns(b)).collect();
+    principal_angle_deg(whitened, &sum, &columns(target).collect::<Vec<_>>(), SUM_RIDGE)
+}
+
+/// Largest principal angle between the spans of columns, of the smaller one's directions, as the noise weighs them and with the zero
+/// free, deg; `ridge` is what the Gram matrix of `a`, whose columns may depend on one another, gets in parts of its largest entry.
+fn principal_angle_deg(whitened: &Whitened, a: &[usize], b: &[usize], ridge: f64) -> f64 {
     let g = &whitened.gram;
     let zero = g[(ZERO, ZERO)];
     let entry = |m: usize, n: usize| g[(m, n)] - g[(m, ZERO)] * g[(n, ZERO)] / zero;
-    let part = |rows: &std::ops::Range<usize>, columns: &std::ops::Range<usize>| {
-        DMatrix::from_fn(rows.len(), columns.len(), |m, n| entry(rows.start + m, columns.start + n))
+    let part = |rows: &[usize], columns: &[usize]| {
+        DMatrix::from_fn(rows.len(), columns.len(), |m, n| entry(rows[m], columns[n]))
     };
-    let half = |block: &Block| nalgebra::Cholesky::new(part(&block.columns, &block.columns)).map(|c| c.l());
-    let (Some(la), Some(lb)) = (half(a), half(b)) else { return 90.0 };
-    let cross = part(&a.columns, &b.columns);
-    let Some(left) = la.solve_lower_triangular(&cross) else { return 90.0 };
-    let Some(both) = lb.solve_lower_triangular(&left.transpose()) else { return 90.0 };
-    let cosines = both.singular_values();
-    let smallest = cosines.iter().copied().fold(1.0, f64::min);
+    let mut gram = part(a, a);
+    let ridge = ridge * gram.diagonal().max();
+    for n in 0..a.len() {
+        gram[(n, n)] += ridge;
+    }
+    let (Some(la), Some(lb)) = (Cholesky::new(gram), Cholesky::new(part(b, b))) else { return 90.0 };
+    let Some(left) = la.l().solve_lower_triangular(&part(a, b)) else { return 90.0 };
+    let Some(both) = lb.l().solve_lower_triangular(&left.transpose()) else { return 90.0 };
+    let smallest = both.singular_values().iter().copied().fold(1.0, f64::min);
     smallest.clamp(0.0, 1.0).acos().to_degrees()
 }
 
-/// Effects that stand under [`SAME_DEG`] from `effect` in this plan and fit the data about as well: their places in the library
+/// Effects that cannot be told from `effect` in this plan and fit the data about as well: their places in the library
 /// with the angle, the effect itself not included.
 #[must_use]
 pub fn confusable(
-    pool: &DesignMatrix,
+    design: &DesignMatrix,
     whitened: &Whitened,
     posterior: &Posterior,
     effect: usize,
     swapped_score: &mut dyn FnMut(usize) -> Option<f64>,
     best_score: f64,
+    settings: &ReportSettings,
 ) -> Vec<(usize, f64)> {
     let Some(own) = posterior.block[effect] else { return Vec::new() };
-    let own_width = pool.blocks[own].width();
+    let own_width = design.blocks[own].width();
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
-    for (b, block) in pool.blocks.iter().enumerate() {
+    for (b, block) in design.blocks.iter().enumerate() {
         let Some(n) = number(block) else { continue };
-        if n == effect || block.width() * MUCH_WIDER < own_width || own_width * MUCH_WIDER < block.width() {
+        if n == effect
+            || block.width() * settings.much_wider < own_width
+            || own_width * settings.much_wider < block.width()
+        {
             continue;
         }
-        let angle = angle_deg(pool, whitened, own, b);
-        if angle >= SAME_DEG {
+        let angle = angle_deg(design, whitened, own, b);
+        if angle >= settings.same_deg {
             continue;
         }
         let Some(score) = swapped_score(b) else { continue };
-        if score < best_score - MEMBER_NATS {
+        if score < best_score - settings.member_nats {
             continue;
         }
         match found.iter_mut().find(|(m, ..)| *m == n) {

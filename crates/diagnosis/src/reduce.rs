@@ -4,15 +4,11 @@
 //! everything after is independent of the log's length. Nothing is lost to a faster sampling than that but what averages
 //! out in a segment, the encoders' line phase, which is collected beside ([`LinePhase`]).
 
-use std::f64::consts::TAU;
-
 use super::line_phase::LinePhase;
 use super::nominal::Nominal;
+use super::settings::Settings;
 use gearmodel::Direction;
 use gearmodel::effect::{OperatingPoint, Term};
-
-/// Length of a segment of the driver's turn, rad.
-const SEGMENT_RAD: f64 = TAU / 1440.0;
 
 /// A segment: mean values of its samples.
 #[derive(Clone, Copy, Debug, Default)]
@@ -67,6 +63,7 @@ pub struct Sample {
 pub struct Reducer<'a> {
     nominal: &'a Nominal,
     run: ReducedRun,
+    segment_rad: f64,
     segment: Segment,
     lines: LinePhase,
     documented_lines: Vec<&'a Term>,
@@ -86,10 +83,17 @@ struct Segment {
 impl<'a> Reducer<'a> {
     /// Begins a run.
     #[must_use]
-    pub fn new(nominal: &'a Nominal, direction: Direction, speed_rpm: f64) -> Self {
+    pub fn new(nominal: &'a Nominal, direction: Direction, speed_rpm: f64, settings: &Settings) -> Self {
         let run = ReducedRun { direction, speed_rpm, points: Vec::new(), within_rad2: 0.0, samples: 0.0 };
-        let lines = LinePhase::new(nominal.rig().lines);
-        Self { nominal, run, segment: Segment::default(), lines, documented_lines: nominal.line_errors().collect() }
+        let lines = LinePhase::new(nominal.rig().lines, &settings.lines);
+        Self {
+            nominal,
+            run,
+            segment_rad: settings.reduction.segment_rad,
+            segment: Segment::default(),
+            lines,
+            documented_lines: nominal.line_errors().collect(),
+        }
     }
 
     /// Takes a sample; one with a gap (NaN) is skipped.
@@ -98,7 +102,7 @@ impl<'a> Reducer<'a> {
             return;
         }
         let filled = self.segment.sum.samples > 0.0;
-        if !filled || (sample.theta1_rad - self.segment.origin.theta1_rad).abs() >= SEGMENT_RAD {
+        if !filled || (sample.theta1_rad - self.segment.origin.theta1_rad).abs() >= self.segment_rad {
             if filled {
                 self.close();
             }

@@ -4,31 +4,10 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::design_matrix::{Candidate, DesignMatrix, WIDE};
+use super::design_matrix::{Candidate, DesignMatrix};
 use super::evidence::{Fit, fit, scan};
 use super::noise::Whitened;
-
-/// Prior odds that an effect of the library is there, before its shape is chosen.
-const EFFECT_ODDS: f64 = 0.04;
-/// Prior odds that any pattern outside the library is there, shared by all of them.
-const UNKNOWN_ODDS: f64 = 0.15;
-/// What it costs that an effect and a pattern share an order by chance, nats.
-const CHANCE_NATS: f64 = 8.0;
-/// Prior of an effect that is known to be there, nats.
-const KNOWN_NATS: f64 = 1e4;
-/// Most blocks of a set.
-const LARGEST_SET: usize = 8;
-/// Largest part, in parts of the whole residual.
-const LARGEST: f64 = 3.0;
-/// How many of the best candidates are tried exactly.
-const TRIED: usize = 5;
-/// How far below the present model a scan may expect a set that is fitted: on the climb, and where all that competes is to be seen.
-const CLIMBING_NATS: f64 = 3.0;
-const COMPETING_NATS: f64 = 9.0;
-/// Candidates kept of a scan.
-const MOST_RANKED: usize = 60;
-/// Starts beside the empty set.
-const STARTS: usize = 4;
+use super::settings::{SearchSettings, Settings};
 
 /// What may join a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -55,7 +34,7 @@ type Ranking = Vec<(usize, f64)>;
 
 /// Everything seen on the way.
 pub struct Search<'a> {
-    pool: &'a DesignMatrix,
+    design: &'a DesignMatrix,
     whitened: &'a Whitened,
     /// Constant of this noise: what the evidence of the empty set lacks.
     offset: f64,
@@ -64,32 +43,51 @@ pub struct Search<'a> {
     /// RMS from which two parts that cancel are no explanation, rad.
     largest_rad: f64,
     priors: Vec<f64>,
+    settings: SearchSettings,
     seen: HashMap<Vec<usize>, Option<Model>>,
     scanned: HashMap<(Vec<usize>, Allowed), Ranking>,
 }
 
 impl<'a> Search<'a> {
-    /// A search in a pool under one noise.
+    /// A search in a design matrix under one noise.
     #[must_use]
-    pub fn new(pool: &'a DesignMatrix, whitened: &'a Whitened, known: &[String], least_rad: f64) -> Self {
-        let unknowns = pool.blocks.iter().filter(|b| matches!(b.cause, Candidate::Unknown(_))).count().max(1) as f64;
-        let priors = pool
+    pub fn new(
+        design: &'a DesignMatrix,
+        whitened: &'a Whitened,
+        known: &[String],
+        least_rad: f64,
+        settings: &Settings,
+    ) -> Self {
+        let own = &settings.search;
+        let unknowns =
+            design.blocks.iter().filter(|b| matches!(b.candidate, Candidate::Unknown(_))).count().max(1) as f64;
+        let priors = design
             .blocks
             .iter()
-            .map(|block| match &block.cause {
+            .map(|block| match &block.candidate {
                 // What is known to be there needs no evidence.
-                Candidate::Effect { effect, .. } if known.iter().any(|name| name == effect.name()) => KNOWN_NATS,
-                Candidate::Effect { cost_nats, .. } => EFFECT_ODDS.ln() - cost_nats,
-                Candidate::Unknown(pattern) => UNKNOWN_ODDS.ln() - unknowns.ln() - pattern.cost_nats(),
+                Candidate::Effect { effect, .. } if known.iter().any(|name| name == effect.name()) => own.known_nats,
+                Candidate::Effect { cost_nats, .. } => own.effect_odds.ln() - cost_nats,
+                Candidate::Unknown(pattern) => own.unknown_odds.ln() - unknowns.ln() - pattern.cost_nats(settings),
             })
             .collect();
         let offset = -0.5 * whitened.log_det - 0.5 * whitened.gram[(0, 0)];
-        let largest_rad = LARGEST * pool.residual_rms_rad();
-        Self { pool, whitened, offset, least_rad, largest_rad, priors, seen: HashMap::new(), scanned: HashMap::new() }
+        let largest_rad = own.largest_part * design.residual_rms_rad();
+        Self {
+            design,
+            whitened,
+            offset,
+            least_rad,
+            largest_rad,
+            priors,
+            settings: settings.search,
+            seen: HashMap::new(),
+            scanned: HashMap::new(),
+        }
     }
 
     fn library(&self, block: usize) -> Option<usize> {
-        match &self.pool.blocks[block].cause {
+        match &self.design.blocks[block].candidate {
             Candidate::Effect { number, .. } => Some(*number),
             Candidate::Unknown(_) => None,
         }
@@ -115,29 +113,34 @@ impl<'a> Search<'a> {
         let start: Vec<f64> = set
             .iter()
             .map(|b| {
-                near.and_then(|fit| fit.set.iter().position(|x| x == b).map(|n| fit.scales_rad[n])).unwrap_or(3e-5)
+                near.and_then(|fit| fit.set.iter().position(|x| x == b).map(|n| fit.scales_rad[n]))
+                    .unwrap_or(self.design.evidence().first_scale_rad)
             })
             .collect();
-        let fit = fit(self.pool, self.whitened, set, &start)?;
-        let possible = (0..set.len()).all(|n| (self.least_rad..self.largest_rad).contains(&fit.rms_rad(self.pool, n)));
-        let causes = || set.iter().map(|b| &self.pool.blocks[*b].cause);
-        let chances = causes().flat_map(|a| causes().map(|b| a.coincides(b))).filter(|same| *same).count();
-        let prior = set.iter().map(|b| self.priors[*b]).sum::<f64>() - CHANCE_NATS * chances as f64;
+        let fit = fit(self.design, self.whitened, set, &start)?;
+        let possible =
+            (0..set.len()).all(|n| (self.least_rad..self.largest_rad).contains(&fit.rms_rad(self.design, n)));
+        let candidates = || set.iter().map(|b| &self.design.blocks[*b].candidate);
+        let chances = candidates().flat_map(|a| candidates().map(|b| a.coincides(b))).filter(|same| *same).count();
+        let prior = set.iter().map(|b| self.priors[*b]).sum::<f64>() - self.settings.chance_nats * chances as f64;
         possible.then_some(Model { score: self.offset + fit.log_evidence + prior, fit })
     }
 
     /// Candidates that may join a set: one shape of an effect at a time.
     fn open(&self, set: &[usize], allowed: Allowed) -> Vec<usize> {
-        (0..self.pool.blocks.len())
+        (0..self.design.blocks.len())
             .filter(|b| !set.contains(b))
             .filter(|b| match self.library(*b) {
                 Some(number) => {
-                    (allowed != Allowed::Narrow || self.pool.blocks[*b].width() <= WIDE)
+                    (allowed != Allowed::Narrow
+                        || self.design.blocks[*b].width() <= self.design.evidence().wide_columns)
                         && !set.iter().any(|s| self.library(*s) == Some(number))
                 }
                 None => allowed == Allowed::All,
             })
-            .filter(|b| !set.iter().any(|s| self.pool.blocks[*s].cause.excludes(&self.pool.blocks[*b].cause)))
+            .filter(|b| {
+                !set.iter().any(|s| self.design.blocks[*s].candidate.excludes(&self.design.blocks[*b].candidate))
+            })
             .collect()
     }
 
@@ -148,11 +151,11 @@ impl<'a> Search<'a> {
             return known[..count.min(known.len())].to_vec();
         }
         let candidates = self.open(&model.fit.set, allowed);
-        let gains = scan(self.pool, self.whitened, &model.fit, &candidates);
+        let gains = scan(self.design, self.whitened, &model.fit, &candidates);
         let mut ranked: Ranking =
             candidates.iter().zip(gains).map(|(b, gain)| (*b, model.score + gain + self.priors[*b])).collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
-        ranked.truncate(MOST_RANKED);
+        ranked.truncate(self.settings.most_ranked);
         let best = ranked[..count.min(ranked.len())].to_vec();
         self.scanned.insert(key, ranked);
         best
@@ -169,7 +172,8 @@ impl<'a> Search<'a> {
     ) -> Vec<Model> {
         let mut models = self.models_of(bases, Some(&model.fit));
         let mut sets = Vec::new();
-        for base in models.iter().filter(|base| base.fit.set.len() < LARGEST_SET) {
+        let largest_set = self.settings.largest_set;
+        for base in models.iter().filter(|base| base.fit.set.len() < largest_set) {
             let additions = self.additions(base, allowed, tried).into_iter();
             let near = additions.filter(|(_, score)| *score > model.score - room);
             sets.extend(near.map(|(block, _)| with(&base.fit.set, block)));
@@ -181,7 +185,7 @@ impl<'a> Search<'a> {
     /// Climbs from a set to where no addition, removal or swap raises the posterior.
     pub fn climb(&mut self, start: Vec<usize>, allowed: Allowed) -> Option<Model> {
         let mut best = self.model(start, None)?;
-        for _ in 0..40 {
+        for _ in 0..self.settings.most_moves {
             let set = &best.fit.set;
             let mut next = self.higher(&best, fewer_by_one(set).chain([set.clone()]).collect(), allowed);
             if next.is_none() {
@@ -198,7 +202,7 @@ impl<'a> Search<'a> {
 
     /// The best model about another, where it is better.
     fn higher(&mut self, best: &Model, bases: Vec<Vec<usize>>, allowed: Allowed) -> Option<Model> {
-        let models = self.about(best, bases, allowed, TRIED, CLIMBING_NATS);
+        let models = self.about(best, bases, allowed, self.settings.tried, self.settings.climbing_nats);
         let highest = models.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))?;
         (highest.score > best.score + 1e-6).then_some(highest)
     }
@@ -213,8 +217,8 @@ impl<'a> Search<'a> {
         if narrow.score > best.score {
             best = narrow;
         }
-        for (block, score) in self.additions(&empty, Allowed::Library, STARTS) {
-            if score < empty.score - 2.0 {
+        for (block, score) in self.additions(&empty, Allowed::Library, self.settings.starts) {
+            if score < empty.score - self.settings.start_nats {
                 continue;
             }
             if let Some(model) = self.climb(vec![block], Allowed::Library)
@@ -238,8 +242,20 @@ impl<'a> Search<'a> {
 
     /// Looks around a model so that what competes with it has been seen: additions, removals, swaps.
     pub fn explore(&mut self, best: &Model) {
-        self.about(best, vec![best.fit.set.clone()], Allowed::All, 60, COMPETING_NATS);
-        self.about(best, fewer_by_one(&best.fit.set).collect(), Allowed::All, 40, COMPETING_NATS);
+        self.about(
+            best,
+            vec![best.fit.set.clone()],
+            Allowed::All,
+            self.settings.most_ranked,
+            self.settings.competing_nats,
+        );
+        self.about(
+            best,
+            fewer_by_one(&best.fit.set).collect(),
+            Allowed::All,
+            self.settings.most_exchanged,
+            self.settings.competing_nats,
+        );
     }
 
     /// All models seen, best first.

@@ -6,9 +6,7 @@ use super::evidence;
 use super::grid::Grid;
 use super::noise::Noise;
 use super::nuisance_patterns::Pattern;
-
-/// Sectors a revolution.
-pub(super) const SECTORS: usize = 12;
+use super::settings::{EvidenceSettings, StepSettings};
 
 /// Mean of a sector of a revolution.
 pub(super) struct Sector {
@@ -25,7 +23,7 @@ pub(super) struct Sector {
 }
 
 /// Means of all sectors in turn.
-pub(super) fn sectors(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Sector> {
+pub(super) fn sectors(grid: &Grid, noise: &Noise, rest: &[f64], settings: &StepSettings) -> Vec<Sector> {
     // Waves above the sector's own length average out; the lower ones are as good as independent from turn to turn.
     let low: f64 = noise.order_rad2.iter().take(4).enumerate().map(|(n, v)| if n == 0 { *v } else { 2.0 * v }).sum();
     let mut sectors = Vec::new();
@@ -33,7 +31,7 @@ pub(super) fn sectors(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Sector> {
         let places: Vec<usize> = revolution.places.clone().collect();
         let mut ordered = places.clone();
         ordered.sort_by(|a, b| grid.places[*a].time_s.total_cmp(&grid.places[*b].time_s));
-        let size = ordered.len().div_ceil(SECTORS).max(1);
+        let size = ordered.len().div_ceil(settings.sectors).max(1);
         for chunk in ordered.chunks(size) {
             let weight: f64 = chunk.iter().map(|p| grid.weight[*p]).sum();
             let mean =
@@ -52,7 +50,7 @@ pub(super) fn sectors(grid: &Grid, noise: &Noise, rest: &[f64]) -> Vec<Sector> {
 
 /// Log evidence that a pattern of time adds to a free level, by the sectors alone: more than there can be, for neighbouring sectors
 /// share their level. Where it is negative the pattern need not be looked at any closer.
-pub(super) fn worth(grid: &Grid, sectors: &[Sector], pattern: &Pattern) -> f64 {
+pub(super) fn worth(grid: &Grid, sectors: &[Sector], pattern: &Pattern, settings: &EvidenceSettings) -> f64 {
     let width = pattern.width();
     let Some(mut at) = grid.places.first().copied() else { return f64::NEG_INFINITY };
     let mut columns = DMatrix::zeros(sectors.len(), width);
@@ -73,7 +71,7 @@ pub(super) fn worth(grid: &Grid, sectors: &[Sector], pattern: &Pattern) -> f64 {
     let mut weighted = columns.clone();
     weighted.column_iter_mut().for_each(|mut column| column.component_mul_assign(&weights));
     let (gram, rhs) = (columns.tr_mul(&weighted), weighted.tr_mul(&values));
-    // As in the pool: an amplitude of the block is the RMS of its trace.
+    // As in the design matrix: an amplitude of the block is the RMS of its trace.
     let scale2 = width as f64 * total / gram.trace();
-    evidence::gain(&(gram * scale2), &(rhs * scale2.sqrt()), width, false)
+    evidence::gain(&(gram * scale2), &(rhs * scale2.sqrt()), width, false, settings)
 }

@@ -6,23 +6,14 @@ use std::f64::consts::TAU;
 use super::grid::Grid;
 use super::nuisance_patterns::Pattern;
 use super::sectors::Sector;
-
-/// Steps of the search and of its refinement, in parts of what the campaign's length tells apart.
-const COARSE: f64 = 0.25;
-const FINE: f64 = 0.02;
-/// Highest frequency, in turns of the fastest run.
-const HIGHEST_TURNS: f64 = 2.0;
-/// Least cycles over the campaign: fewer are a drift.
-const LEAST_CYCLES: f64 = 2.0;
-/// Fewest sectors.
-const FEWEST: usize = 48;
+use super::settings::RunningOnSettings;
 
 /// The slow tone that takes most off the sectors of a residual, if any could be seen.
 #[must_use]
-pub(super) fn strongest(grid: &Grid, sectors: &[Sector]) -> Option<Pattern> {
+pub(super) fn strongest(grid: &Grid, sectors: &[Sector], settings: &RunningOnSettings) -> Option<Pattern> {
     let duration_s = grid.plan.duration_s;
     let turn_hz = grid.plan.speeds_rad_per_s.last()? / TAU;
-    if sectors.len() < FEWEST || duration_s <= 0.0 {
+    if sectors.len() < settings.tone_sectors || duration_s <= 0.0 {
         return None;
     }
     let best = |low_hz: f64, high_hz: f64, step_hz: f64| {
@@ -33,8 +24,13 @@ pub(super) fn strongest(grid: &Grid, sectors: &[Sector]) -> Option<Pattern> {
             .max_by(|a, b| a.1.total_cmp(&b.1))
     };
     let unit_hz = 1.0 / duration_s;
-    let (coarse_hz, _) = best(LEAST_CYCLES * unit_hz, HIGHEST_TURNS * turn_hz, COARSE * unit_hz)?;
-    let (frequency_hz, _) = best(coarse_hz - COARSE * unit_hz, coarse_hz + COARSE * unit_hz, FINE * unit_hz)?;
+    let (coarse_hz, _) =
+        best(settings.tone_cycles * unit_hz, settings.tone_turns * turn_hz, settings.tone_step * unit_hz)?;
+    let (frequency_hz, _) = best(
+        coarse_hz - settings.tone_step * unit_hz,
+        coarse_hz + settings.tone_step * unit_hz,
+        settings.tone_fine_step * unit_hz,
+    )?;
     Some(Pattern::Tone { frequency_hz })
 }
 

@@ -4,34 +4,14 @@
 
 use super::grid::Grid;
 use super::reduce::ReducedRun;
+use super::settings::TransientSettings;
 
-/// How far a place must stand out, in robust standard deviations, to begin a knock, and how little for it to be over.
-const OUTSTANDING: f64 = 8.0;
-const QUIET: f64 = 2.5;
-/// Part of the RMS from which the standard deviation by the median says that it rings all the time, and how much higher peaks are then.
-const RINGING: f64 = 0.5;
-const RINGING_PEAKS: f64 = 1.5;
-/// Quiet places that end a knock.
-const QUIET_PLACES: usize = 6;
-/// Places on either side whose levels tell a step from a knock, and the part of its peak that a step leaves.
-const BESIDE: usize = 30;
-const STEP: f64 = 0.25;
-/// Times that they are looked for.
-const PASSES: usize = 4;
-/// Places from which a segment at a run's beginning is no knock.
-const SETTLING: usize = 20;
-/// Part of it on one side.
-const ONE_SIDED: f64 = 0.9;
-/// What takes more than this part of the places is no knock.
-const MOST: f64 = 0.2;
 /// Median absolute deviation → standard deviation.
 const OF_MEDIAN: f64 = 1.4826;
-/// Least standard deviation, rad: finer than any encoder.
-const LEAST_RAD: f64 = 1e-9;
 
 /// Knocks that were cut out.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Knocks {
+pub struct Transients {
     /// How many.
     pub count: usize,
     /// Time of the first since the campaign's start, s.
@@ -45,31 +25,31 @@ pub struct Knocks {
 }
 
 /// Finds knocks and cuts their points out of the runs; `None` where there are none.
-pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
+pub fn take_off(grid: &Grid, runs: &mut [ReducedRun], settings: &TransientSettings) -> Option<Transients> {
     let mut cut = vec![false; grid.places.len()];
     let mut found: Vec<Window> = Vec::new();
     // Where they crowd, they stand in the medians that they are found by: once more without those that are known.
-    for _ in 0..PASSES {
-        let more = find(grid, &cut)?;
+    for _ in 0..settings.passes {
+        let more = find(grid, &cut, settings)?;
         for window in &more {
             cut[window.places.clone()].fill(true);
         }
         let none = more.is_empty();
         found.extend(more);
-        if none || share(&cut) > MOST {
+        if none || share(&cut) > settings.most {
             break;
         }
     }
-    if found.is_empty() || share(&cut) > MOST {
+    if found.is_empty() || share(&cut) > settings.most {
         return None;
     }
-    let mut knocks = Knocks { count: found.len(), first_s: f64::INFINITY, ..Knocks::default() };
+    let mut transients = Transients { count: found.len(), first_s: f64::INFINITY, ..Transients::default() };
     let sum = |of: fn(&Window) -> f64| found.iter().map(of).sum::<f64>();
-    knocks.ring_hz = 0.5 * sum(|w| w.crossings) / sum(|w| w.lasts_s).max(f64::MIN_POSITIVE);
+    transients.ring_hz = 0.5 * sum(|w| w.crossings) / sum(|w| w.lasts_s).max(f64::MIN_POSITIVE);
     for window in &found {
-        knocks.first_s = knocks.first_s.min(window.begin_s);
-        knocks.peak_rad = knocks.peak_rad.max(window.peak_rad);
-        knocks.mean_square_rad2 += window.square_rad2 / grid.samples;
+        transients.first_s = transients.first_s.min(window.begin_s);
+        transients.peak_rad = transients.peak_rad.max(window.peak_rad);
+        transients.mean_square_rad2 += window.square_rad2 / grid.samples;
         // They ring on under the scatter.
         let run = grid.places[window.places.start].run;
         let tail = window.places.end..window.places.end + window.places.len() / 2;
@@ -81,7 +61,7 @@ pub fn take_off(grid: &Grid, runs: &mut [ReducedRun]) -> Option<Knocks> {
         let mut place = places.iter();
         run.points.retain(|_| place.next().is_none_or(|p| !cut[*p]));
     }
-    Some(knocks)
+    Some(transients)
 }
 
 fn share(cut: &[bool]) -> f64 {
@@ -101,7 +81,7 @@ struct Window {
 }
 
 /// Knocks outside what is cut already; `None` where cells do not come again often enough.
-fn find(grid: &Grid, cut: &[bool]) -> Option<Vec<Window>> {
+fn find(grid: &Grid, cut: &[bool], settings: &TransientSettings) -> Option<Vec<Window>> {
     let Deviations { plain, beyond_climb: deviations } = deviations(grid, cut)?;
     // As a bin of mean weight would scatter.
     let mean_weight = grid.samples / grid.places.len() as f64;
@@ -116,18 +96,23 @@ fn find(grid: &Grid, cut: &[bool]) -> Option<Vec<Window>> {
         let Some(first) = places.next() else { continue };
         let of_run = first.start..places.next_back().map_or(first.end, |last| last.end);
         // A rig that shakes more under one condition than another is not knocked there.
-        let Some(Scatter { sigma_rad, outstanding_rad }) = scatter(&plain[of_run.clone()], &cut[of_run.clone()]) else {
+        let Some(Scatter { sigma_rad, outstanding_rad }) =
+            scatter(&plain[of_run.clone()], &cut[of_run.clone()], settings)
+        else {
             continue;
         };
         let mut at = of_run.start;
         while let Some(begin) = (at..of_run.end).find(|p| even[*p].abs() > outstanding_rad) {
-            let window = window(&even, &of_run, begin, QUIET * sigma_rad);
+            let window = window(&even, &of_run, begin, settings.quiet * sigma_rad, settings.quiet_places);
             at = window.end;
             let peak_rad = window.clone().map(|p| deviations[p].abs()).fold(0.0, f64::max);
             // What is under way where the run begins and comes to rest from one side settles; what lasts to its end may be a step.
-            let at_an_end = window.start < of_run.start + QUIET_PLACES || window.end + QUIET_PLACES > of_run.end;
-            let settles = at_an_end && window.len() > SETTLING && one_sided(&deviations[window.clone()]);
-            if settles || leaves_a_step(&deviations, &of_run, &window, peak_rad) {
+            let at_an_end =
+                window.start < of_run.start + settings.quiet_places || window.end + settings.quiet_places > of_run.end;
+            let settles = at_an_end
+                && window.len() > settings.settling_places
+                && one_sided(&deviations[window.clone()], settings);
+            if settles || leaves_a_step(&deviations, &of_run, &window, peak_rad, settings) {
                 continue;
             }
             found.push(Window {
@@ -193,35 +178,41 @@ struct Scatter {
 }
 
 /// Of what is not cut; `None` where nothing is left.
-fn scatter(deviations: &[f64], cut: &[bool]) -> Option<Scatter> {
+fn scatter(deviations: &[f64], cut: &[bool], settings: &TransientSettings) -> Option<Scatter> {
     let mut sizes: Vec<f64> = deviations.iter().zip(cut).filter(|(_, cut)| !**cut).map(|(d, _)| d.abs()).collect();
     let (count, middle) = (sizes.len() as f64, sizes.len() / 2);
     let median_rad = (!sizes.is_empty()).then(|| *sizes.select_nth_unstable_by(middle, f64::total_cmp).1)?;
-    let sigma_rad = (OF_MEDIAN * median_rad).max(LEAST_RAD);
+    let sigma_rad = (OF_MEDIAN * median_rad).max(settings.least_rad);
     // Between knocks it is quiet; a rig that rings all the time has high peaks too.
     let rms_rad = (sizes.iter().map(|d| d * d).sum::<f64>() / count).sqrt();
-    let rings = if sigma_rad > RINGING * rms_rad { RINGING_PEAKS } else { 1.0 };
-    Some(Scatter { sigma_rad, outstanding_rad: OUTSTANDING * rings * sigma_rad })
+    let rings = if sigma_rad > settings.ringing * rms_rad { settings.ringing_peaks } else { 1.0 };
+    Some(Scatter { sigma_rad, outstanding_rad: settings.outstanding * rings * sigma_rad })
 }
 
 /// From where it begins to be loud to where it has been quiet for a while.
-fn window(deviations: &[f64], run: &std::ops::Range<usize>, begin: usize, quiet_rad: f64) -> std::ops::Range<usize> {
+fn window(
+    deviations: &[f64],
+    run: &std::ops::Range<usize>,
+    begin: usize,
+    quiet_rad: f64,
+    quiet_places: usize,
+) -> std::ops::Range<usize> {
     let loud = |p: &usize| deviations[*p].abs() > quiet_rad;
     let mut start = begin;
-    while let Some(before) = (start.saturating_sub(QUIET_PLACES).max(run.start)..start).find(loud) {
+    while let Some(before) = (start.saturating_sub(quiet_places).max(run.start)..start).find(loud) {
         start = before;
     }
     let mut end = begin + 1;
-    while let Some(after) = (end..(end + QUIET_PLACES).min(run.end)).rfind(loud) {
+    while let Some(after) = (end..(end + quiet_places).min(run.end)).rfind(loud) {
         end = after + 1;
     }
     start..end
 }
 
 /// Whether nearly all of it lies on one side.
-fn one_sided(deviations: &[f64]) -> bool {
+fn one_sided(deviations: &[f64], settings: &TransientSettings) -> bool {
     let (sum, total) = deviations.iter().fold((0.0, 0.0), |(sum, total), d| (sum + d, total + d.abs()));
-    f64::abs(sum) > ONE_SIDED * total
+    f64::abs(sum) > settings.one_sided * total
 }
 
 /// Whether the level before and after differs by a good part of the peak.
@@ -230,15 +221,16 @@ fn leaves_a_step(
     run: &std::ops::Range<usize>,
     window: &std::ops::Range<usize>,
     peak_rad: f64,
+    settings: &TransientSettings,
 ) -> bool {
     let median = |range: std::ops::Range<usize>| {
         let mut values = deviations[range].to_vec();
         values.sort_by(f64::total_cmp);
         values.get(values.len() / 2).copied().unwrap_or(0.0)
     };
-    let before = median(window.start.saturating_sub(BESIDE).max(run.start)..window.start);
-    let after = median(window.end..(window.end + BESIDE).min(run.end));
-    (after - before).abs() > STEP * peak_rad
+    let before = median(window.start.saturating_sub(settings.beside).max(run.start)..window.start);
+    let after = median(window.end..(window.end + settings.beside).min(run.end));
+    (after - before).abs() > settings.step * peak_rad
 }
 
 #[cfg(test)]
@@ -249,7 +241,8 @@ mod tests {
     /// One run of four turns with the residual as given at (turn, bin).
     fn grid(rho: impl Fn(usize, usize) -> f64) -> Grid {
         let bins = 100;
-        let mut grid = Grid::new(&Rig::new(pair(), gearmodel::Errors::default(), [None, None], None), &[]);
+        let rig = Rig::new(pair(), gearmodel::Errors::default(), [None, None], None);
+        let mut grid = Grid::new(&rig, &[], &crate::Settings::default());
         grid.bins = bins;
         grid.cells = vec![OperatingPoint::default(); bins];
         grid.directions = vec![gearmodel::Direction::Ccw];
@@ -281,12 +274,13 @@ mod tests {
 
     #[test]
     fn a_burst_is_cut_out_and_a_step_or_a_trace_of_the_angle_is_not() {
+        let settings = TransientSettings::default();
         let ringing = |turn: usize, bin: usize| {
             let after = bin as f64 - 40.0;
             if turn == 2 && after >= 0.0 { 80e-6 * (-after / 5.0).exp() * after.cos() } else { 0.0 }
         };
         let mut runs = [run()];
-        let found = take_off(&grid(ringing), &mut runs).expect("a knock");
+        let found = take_off(&grid(ringing), &mut runs, &settings).expect("a knock");
         assert_eq!((found.count, found.first_s), (1, 240.0));
         assert!((found.peak_rad - 80e-6).abs() < 3e-6, "{found:?}");
         let lost = 400 - runs[0].points.len();
@@ -301,7 +295,7 @@ mod tests {
         ];
         for (n, rho) in quiet.into_iter().enumerate() {
             let mut runs = [run()];
-            assert!(take_off(&grid(rho), &mut runs).is_none(), "case {n}");
+            assert!(take_off(&grid(rho), &mut runs, &settings).is_none(), "case {n}");
             assert_eq!(runs[0].points.len(), 400, "case {n}");
         }
     }

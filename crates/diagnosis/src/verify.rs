@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::nominal::Nominal;
 use super::reduce::ReducedRun;
+use super::settings::ReductionSettings;
 
 /// Angle bins a turn, in which revolutions are compared.
 const BINS: usize = 360;
@@ -138,7 +139,7 @@ impl Sums {
 pub fn verify(nominal: &Nominal, mut runs: Vec<ReducedRun>) -> Option<Verified> {
     runs.retain(|run| !run.points.is_empty());
     runs.sort_by(|a, b| a.points[0].time_s.total_cmp(&b.points[0].time_s));
-    nominal.take_off_effects(&mut runs);
+    nominal.take_off_effects(&mut runs, &ReductionSettings::default());
     // Every run counts alike in the zero, however long it is.
     let means = runs.iter().map(|run| run.points.iter().map(|p| p.rho_rad).sum::<f64>() / run.points.len() as f64);
     let zero_rad = means.sum::<f64>() / runs.len() as f64;
@@ -185,7 +186,7 @@ mod tests {
         let mut runs = Vec::new();
         let (mut time_s, mut way_rev) = (0.0, 0.0);
         for direction in Direction::BOTH {
-            let mut reducer = Reducer::new(&nominal, direction, 6.0);
+            let mut reducer = Reducer::new(&nominal, direction, 6.0, &crate::Settings::default());
             for n in 0..4 * 3600 {
                 let theta1_rad = direction.sign() * f64::from(n) * TAU / 3600.0;
                 let theta2 = nominal.rig().pair().theta2(theta1_rad);

@@ -58,7 +58,7 @@ fn campaign(rig: &Rig) -> Grid {
             ReducedRun { direction: *direction, speed_rpm, points, within_rad2: 0.0, samples: 720.0 }
         })
         .collect();
-    Grid::new(rig, &runs)
+    Grid::new(rig, &runs, &diagnosis::Settings::default())
 }
 
 /// Sum of `amount`(sense, load) over the revolutions driven up to a time.

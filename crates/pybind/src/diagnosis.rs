@@ -102,7 +102,7 @@ pub fn diagnose(
     let reads: Vec<_> = recordings.iter().map(|r| r.get().read(py)).collect();
     let recordings = reads.iter().map(|read| read.recording()).collect::<Result<Vec<_>>>()?;
     let model = pair.get().model.clone();
-    let options = Options { known, exclude };
+    let options = Options { known, exclude, ..Options::default() };
     let (diagnosis, nominal) = py.detach(|| diagnosis::diagnose_with_nominal(&recordings, &model, &options))?;
     Ok(NativeDiagnosis { diagnosis, nominal })
 }
@@ -118,11 +118,11 @@ pub fn diagnose_logs(
     exclude: Vec<String>,
 ) -> Result<(NativeDiagnosis, Vec<String>)> {
     let model = pair.get().model.clone();
-    let options = Options { known, exclude };
+    let options = Options { known, exclude, ..Options::default() };
     py.detach(|| {
         let logs = CampaignLogs::open(&paths)?;
         let nominal = logs.nominal(model);
-        let reduced = logs.reduce(&nominal)?;
+        let reduced = logs.reduce(&nominal, &options.settings)?;
         let incomplete = reduced.incomplete();
         let diagnosis = diagnosis::diagnose_runs(&nominal, reduced.runs, &options)?;
         Ok((NativeDiagnosis { diagnosis, nominal }, incomplete))

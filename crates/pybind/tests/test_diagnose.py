@@ -46,6 +46,7 @@ def test_fields_are_those_of_the_contract(case, request):
     assert json.loads(json.dumps(fields, allow_nan=False)) == fields
     assert set(fields) == {
         "gap", "where", "effects", "groups", "unknown", "verdict", "next", "warnings", "confusability",
+        "settings",
     }  # fmt: skip
     gap = fields["gap"]
     assert set(gap) == {"before_rad", "after_rad", "floor_rad", "closed", "closed_interval", "budget"}

@@ -134,6 +134,55 @@ fn location(diagnosis: &Diagnosis) -> String {
 /// A self-contained page: no script, picture or font from elsewhere.
 #[must_use]
 pub fn page(diagnosis: &Diagnosis) -> String {
+    let mut page = head(diagnosis);
+    let causes = tables::causes(diagnosis);
+    if !causes.is_empty() {
+        section(&mut page, "Causes", "", &format!("<div class=\"cards\">{causes}</div>"));
+    }
+    if !diagnosis.next.is_empty() {
+        section(&mut page, "What to do next", "", &tables::experiments(&diagnosis.next));
+    }
+    if !diagnosis.gap.budget.is_empty() && diagnosis.gap.closed.is_some() {
+        section(
+            &mut page,
+            "Gap budget",
+            "Share of the reducible gap, that is of before² − floor². Parts that work against each other may exceed 100 % or be negative.",
+            &format!("{}{}", charts::budget(diagnosis), tables::budget(diagnosis)),
+        );
+    }
+    each_run(&mut page, diagnosis);
+    section(
+        &mut page,
+        "Where the gap lies",
+        "Bars: the gap against the nominal model, RMS, for orders the amplitude; coloured where more than half above the floor. \
+         Dashed: what repeatability alone gives there.",
+        &location(diagnosis),
+    );
+    section(
+        &mut page,
+        "Residual over angle and revolution",
+        "Stripes that stand upright belong to an angle; rows that differ belong to time, load or single revolutions. Grey: not measured.",
+        &maps::by_revolution(&diagnosis.curves),
+    );
+    section(
+        &mut page,
+        "Residual over angle and load",
+        "What deepens downwards within a sense grows with the load; what changes colour between the senses is odd: play, wind-up, friction, delay.",
+        &maps::by_load(&diagnosis.curves),
+    );
+    section(&mut page, "Probability of every effect", "", &tables::probabilities(diagnosis));
+    section(
+        &mut page,
+        "Who looks like whom under this plan",
+        "Angle between the traces of two effects, degrees: 0 is the same trace, 90 is nothing in common. Framed: under 2°, not to be told apart by this data.",
+        &tables::confusability(diagnosis),
+    );
+    page.push_str("</main></body></html>\n");
+    page
+}
+
+/// The headline, what is advised, and what the data does not allow.
+fn head(diagnosis: &Diagnosis) -> String {
     let mut page = String::new();
     let title = headline(diagnosis);
     let _ = write!(
@@ -165,21 +214,11 @@ pub fn page(diagnosis: &Diagnosis) -> String {
             "<div class=\"warn\"><b>What this data does not allow one to conclude</b><ul>{items}</ul></div>"
         );
     }
-    let causes = tables::causes(diagnosis);
-    if !causes.is_empty() {
-        section(&mut page, "Causes", "", &format!("<div class=\"cards\">{causes}</div>"));
-    }
-    if !diagnosis.next.is_empty() {
-        section(&mut page, "What to do next", "", &tables::experiments(&diagnosis.next));
-    }
-    if !diagnosis.gap.budget.is_empty() && diagnosis.gap.closed.is_some() {
-        section(
-            &mut page,
-            "Gap budget",
-            "Share of the reducible gap, that is of before² − floor². Parts that work against each other may exceed 100 % or be negative.",
-            &format!("{}{}", charts::budget(diagnosis), tables::budget(diagnosis)),
-        );
-    }
+    page
+}
+
+/// Every run before and after.
+fn each_run(page: &mut String, diagnosis: &Diagnosis) {
     let shown = diagnosis.curves.len().min(charts::MOST_RUNS);
     let scale = charts::shared_scale_rad(&diagnosis.curves);
     let rest = if shown < diagnosis.curves.len() {
@@ -188,7 +227,7 @@ pub fn page(diagnosis: &Diagnosis) -> String {
         String::new()
     };
     section(
-        &mut page,
+        page,
         "Each run before and after",
         "",
         &if shown == 0 {
@@ -201,32 +240,4 @@ pub fn page(diagnosis: &Diagnosis) -> String {
             )
         },
     );
-    section(
-        &mut page,
-        "Where the gap lies",
-        "Bars: the gap against the nominal model, RMS, for orders the amplitude; coloured where more than half above the floor. \
-         Dashed: what repeatability alone gives there.",
-        &location(diagnosis),
-    );
-    section(
-        &mut page,
-        "Residual over angle and revolution",
-        "Stripes that stand upright belong to an angle; rows that differ belong to time, load or single revolutions. Grey: not measured.",
-        &maps::by_revolution(&diagnosis.curves),
-    );
-    section(
-        &mut page,
-        "Residual over angle and load",
-        "What deepens downwards within a sense grows with the load; what changes colour between the senses is odd: play, wind-up, friction, delay.",
-        &maps::by_load(&diagnosis.curves),
-    );
-    section(&mut page, "Probability of every effect", "", &tables::probabilities(diagnosis));
-    section(
-        &mut page,
-        "Who looks like whom under this plan",
-        "Angle between the traces of two effects, degrees: 0 is the same trace, 90 is nothing in common. Framed: under 2°, not to be told apart by this data.",
-        &tables::confusability(diagnosis),
-    );
-    page.push_str("</main></body></html>\n");
-    page
 }

@@ -10,8 +10,6 @@ use crate::summary::{group_probability, is_elliptic, words};
 
 /// Effects under this probability are listed by name alone.
 const SHOWN: f64 = 0.01;
-/// Members of a group stand closer than this, deg.
-const SAME_DEG: f64 = 2.0;
 
 /// A parameter's text with the signs that a page can show.
 fn pretty(text: &str) -> String {
@@ -258,7 +256,7 @@ pub fn confusability(diagnosis: &Diagnosis) -> String {
             let Some(angle) = table.angle_deg.get(m).and_then(|row| row.get(n)).copied() else { continue };
             // Steps of alikeness, from the same to unrelated.
             let class = match angle {
-                a if a < SAME_DEG => "a5",
+                a if a < diagnosis.settings.report.same_deg => "a5",
                 a if a < 10.0 => "a4",
                 a if a < 20.0 => "a3",
                 a if a < 35.0 => "a2",
@@ -271,7 +269,7 @@ pub fn confusability(diagnosis: &Diagnosis) -> String {
             let text = if angle < 10.0 { format!("{angle:.1}") } else { format!("{angle:.0}") };
             let on = if angle < 10.0 { "t small on strong" } else { "t small" };
             svg.text(on, [x + cell / 2.0, y + 20.0], Anchor::Middle, &text);
-            if angle < SAME_DEG {
+            if angle < diagnosis.settings.report.same_deg {
                 svg.rect("same", [x + 1.0, y + 1.0], [cell - 2.0, cell - 2.0], "");
             }
         }

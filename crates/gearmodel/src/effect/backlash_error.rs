@@ -1,7 +1,7 @@
 //! Tooth thinning differs from the designed backlash by dj along the pitch curve:
 //! TE = −dir·(dj/2) cos α/A.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{Carrier, Effect, Estimate, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Tooth thinning differs from the designed backlash by dj along the pitch curve.
 pub(super) struct BacklashError;
@@ -36,6 +36,10 @@ impl Effect for BacklashError {
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("dj_mm", found.beta[0], found.std(0), "mm")]
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[HandTest::PressDrivenShaft, HandTest::FreeSeals]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -1,7 +1,7 @@
 //! Bearings with play: the load pushes the gear aside by c along the common normal, TE = −dir·c/A, whatever its size.
 //! The same trace as a backlash error of 2c/cos α.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{Carrier, Effect, Estimate, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Bearings with play.
 pub(super) struct BearingClearance;
@@ -37,6 +37,10 @@ impl Effect for BearingClearance {
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("c_mm", found.beta[0], found.std(0), "mm")]
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[HandTest::PressDrivenShaft, HandTest::FreeSeals]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

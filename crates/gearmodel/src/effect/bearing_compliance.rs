@@ -1,7 +1,7 @@
 //! Bearings give way along the common normal, c mm a newton: with the tooth force F = 1000 T/A (T in N·m, A in mm),
 //! TE = −dir·1000 T c/A².
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{Carrier, Effect, Estimate, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Bearings give way along the common normal, c mm a newton.
 pub(super) struct BearingCompliance;
@@ -33,6 +33,10 @@ impl Effect for BearingCompliance {
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("c_mm_per_n", found.beta[0], found.std(0), "mm/N")]
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[HandTest::WatchDrivenShaft]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

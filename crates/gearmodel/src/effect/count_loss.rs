@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use super::{
     Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    Stated, StatedEffect, StatedError, Words,
+    Stated, StatedEffect, StatedError, Value, Words,
 };
 
 /// Stands for steps spread evenly over the way; times are not negative.
@@ -91,6 +91,19 @@ impl Effect for CountLoss {
         // What lies between the places found may be one step or two.
         parameters.push(Parameter::grid("steps", steps, ""));
         parameters
+    }
+
+    /// Steps and their rate: one follows from the other.
+    fn over_a_campaign(&self, found: &[Parameter], revolutions: f64) -> Option<Parameter> {
+        let number = |name: &str| match found.iter().find(|p| p.name == name)?.value {
+            Value::Number(x) => Some(x),
+            _ => None,
+        };
+        match (number("steps"), number("per_rev")) {
+            (Some(steps), _) => Some(Parameter::grid("per_rev", steps / revolutions, "1/rev")),
+            (None, Some(per_rev)) => Some(Parameter::grid("steps", (per_rev * revolutions).round(), "")),
+            (None, None) => None,
+        }
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

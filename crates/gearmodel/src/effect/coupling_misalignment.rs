@@ -3,7 +3,8 @@
 //! seen as i times that.
 
 use super::{
-    Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Words,
+    Effect, Estimate, Given, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError,
+    Words,
 };
 
 /// Misalignment of the coupling in the input or output shaft.
@@ -56,6 +57,13 @@ impl Effect for CouplingMisalignment {
             Parameter::number("beta_rad", 2.0 * root, polar.amplitude_std / root, "rad"),
             Parameter::number("phase_rad", polar.phase_rad, polar.phase_std_rad, "rad"),
         ]
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        match self.0 {
+            Shaft::Input => &[HandTest::SwapInputCoupling],
+            Shaft::Output => &[HandTest::SwapOutputCoupling],
+        }
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Estimate, Grain, OperatingPoint, Parameter, Plan, Rig, Shaft, Signature, Words};
+use super::{Estimate, Grain, HandTest, OperatingPoint, Parameter, Plan, Rig, Shaft, Signature, Words};
 use crate::stated::{Given, StatedEffect, StatedError};
 
 /// Values of the parameters in which a trace is not linear; which they are, the effect knows. Empty where there are none.
@@ -94,6 +94,16 @@ pub trait Effect: Sync {
         (&[], 0.0)
     }
 
+    /// Encoder within whose lines the trace lies: it is found on the samples, for means over angle do not show it.
+    fn within_lines_of(&self) -> Option<Shaft> {
+        None
+    }
+
+    /// Tests by hand that tell it from others which take part in them.
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[]
+    }
+
     /// True where a shape is a list of times at which the level steps.
     fn steps(&self) -> bool {
         false
@@ -111,6 +121,11 @@ pub trait Effect: Sync {
 
     /// Parameters in the contract's names and units.
     fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter>;
+
+    /// The parameter that only follows from those found with the revolutions of a campaign.
+    fn over_a_campaign(&self, _found: &[Parameter], _revolutions: f64) -> Option<Parameter> {
+        None
+    }
 
     /// The documented error that this effect is a change of.
     fn folds_into(&self) -> Option<Fold> {

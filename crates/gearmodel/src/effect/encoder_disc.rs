@@ -3,7 +3,8 @@
 //! encoder.
 
 use super::{
-    Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError, Words,
+    Effect, Estimate, Given, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError,
+    Words,
 };
 
 /// Order 1 or 2 of the input or output encoder's disc.
@@ -79,6 +80,17 @@ impl Effect for EncoderDisc {
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         found.polar(0).parameters("eps", "")
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        match (self.order, self.shaft) {
+            (Order::Eccentricity, Shaft::Input) => {
+                &[HandTest::TurnOutputEncoder, HandTest::TurnInputEncoder, HandTest::ReindexGear2]
+            }
+            (Order::Eccentricity, Shaft::Output) => &[HandTest::TurnOutputEncoder, HandTest::ReindexGear2],
+            (Order::Ellipticity, Shaft::Input) => &[HandTest::SwapInputCoupling, HandTest::ReindexGear2],
+            (Order::Ellipticity, Shaft::Output) => &[HandTest::SwapOutputCoupling, HandTest::ReindexGear2],
+        }
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

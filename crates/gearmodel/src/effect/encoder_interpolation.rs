@@ -3,19 +3,19 @@
 //! on the samples (by the diagnosis). The shape is [order h, lines L].
 
 use super::{
-    Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError,
-    Words,
+    Carrier, Effect, Estimate, Given, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature,
+    StatedError, Words,
 };
-
-/// Names by encoder: these effects are found on the samples, not on the places.
-pub const NAMES: [&str; 2] = ["encoder1_interpolation", "encoder2_interpolation"];
 
 /// Interpolation error of the input or output encoder.
 pub(super) struct EncoderInterpolation(pub(super) Shaft);
 
 impl Effect for EncoderInterpolation {
     fn name(&self) -> &'static str {
-        NAMES[usize::from(self.0 == Shaft::Output)]
+        match self.0 {
+            Shaft::Input => "encoder1_interpolation",
+            Shaft::Output => "encoder2_interpolation",
+        }
     }
 
     fn component(&self) -> &'static str {
@@ -47,6 +47,10 @@ impl Effect for EncoderInterpolation {
         true
     }
 
+    fn within_lines_of(&self) -> Option<Shaft> {
+        Some(self.0)
+    }
+
     /// None before the samples were searched for lines.
     fn shapes(&self, _rig: &Rig, _plan: &super::Plan) -> Vec<Shape> {
         Vec::new()
@@ -69,6 +73,10 @@ impl Effect for EncoderInterpolation {
             parameters.push(Parameter::grid("order", order, ""));
         }
         parameters
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[HandTest::ReindexGear2]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -1,7 +1,7 @@
 //! Drag of seals and bearings winds the shafts up beside the load: TE = −dir·M·[C_out + C_in i² + C_mesh/A²] with the
 //! documented compliances, or at 1 rad/(N·m) where there are none.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{Carrier, Effect, Estimate, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Drag of seals and bearings winds the shafts up beside the load.
 pub(super) struct FrictionWindup;
@@ -37,6 +37,10 @@ impl Effect for FrictionWindup {
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("torque_nm", found.beta[0], found.std(0), "N.m")]
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[HandTest::FreeSeals]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -3,7 +3,7 @@
 //! By the increment along the common normal, with a = dir·(α ∓ μ) (`increment::common_normal`):
 //! TE = [dx sin(θ1 + a) + dy cos(θ1 + a)]/A for gear 1, [dx sin(θ2 − a) + dy cos(θ2 − a)]/A for gear 2.
 
-use super::{Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, Words};
+use super::{Effect, Estimate, Fold, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, Words};
 
 /// Eccentricity of gear 1 (input) or gear 2 (output) against the documented one.
 pub(super) struct GearEccentricity(pub(super) Shaft);
@@ -65,6 +65,10 @@ impl Effect for GearEccentricity {
 
     fn folds_into(&self) -> Option<Fold> {
         Some(Fold::Eccentricity(self.0))
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[HandTest::ReindexGear2]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -1,6 +1,8 @@
 //! The teeth give way along the common normal: TE = −dir·T·C/A².
 
-use super::{Carrier, Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{
+    Carrier, Effect, Estimate, Fold, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words,
+};
 
 /// The teeth give way along the common normal.
 pub(super) struct MeshCompliance;
@@ -36,6 +38,10 @@ impl Effect for MeshCompliance {
 
     fn folds_into(&self) -> Option<Fold> {
         Some(Fold::MeshCompliance)
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[HandTest::WatchDrivenShaft]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -16,6 +16,7 @@
 // What effects have in common.
 mod definition;
 mod documented;
+mod hand_test;
 mod operating_point;
 mod parameter;
 mod polar;
@@ -54,8 +55,8 @@ mod wear_drift;
 pub use crate::stated::{Given, Stated, StatedEffect, StatedError};
 pub use definition::{Effect, Fold, Rows, Shape};
 pub use documented::{Documented, Term};
-pub use encoder_interpolation::NAMES as INTERPOLATION;
-pub use operating_point::{Grain, MOST_LOADS, OperatingPoint, Plan, RevolutionsByLoad};
+pub use hand_test::HandTest;
+pub use operating_point::{Grain, MOST_LOADS, OperatingPoint, Plan, RevolutionsByLoad, nearest_level};
 pub use parameter::{Parameter, ParameterKind, Value};
 pub use polar::Estimate;
 pub use rig::{MeshOrders, Rig};

@@ -53,6 +53,37 @@ pub struct RevolutionsByLoad {
     pub way_rev: [f64; MOST_LOADS],
 }
 
+impl RevolutionsByLoad {
+    /// No revolutions yet at these loads, of which the first [`MOST_LOADS`] are booked apart.
+    #[must_use]
+    pub fn at_loads(loads_nm: &[f64]) -> Self {
+        let mut revolutions = Self::default();
+        for (slot, load) in revolutions.load_nm.iter_mut().zip(loads_nm) {
+            *slot = *load;
+        }
+        revolutions
+    }
+
+    /// Books signed revolutions at the load nearest to that under which they were driven.
+    pub fn turn(&mut self, load_nm: f64, revolutions: f64) {
+        let slot = nearest_level(&self.load_nm, load_nm);
+        self.signed_rev[slot] += revolutions;
+        self.way_rev[slot] += revolutions.abs();
+    }
+
+    /// Revolutions in either sense at all loads.
+    #[must_use]
+    pub fn total_way_rev(&self) -> f64 {
+        self.way_rev.iter().sum()
+    }
+}
+
+/// Place of the level nearest to a value; 0 where there is none.
+#[must_use]
+pub fn nearest_level(levels: &[f64], value: f64) -> usize {
+    (0..levels.len()).min_by(|a, b| (levels[*a] - value).abs().total_cmp(&(levels[*b] - value).abs())).unwrap_or(0)
+}
+
 impl OperatingPoint {
     /// Angle of a shaft, rad.
     #[must_use]

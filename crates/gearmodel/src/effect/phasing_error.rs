@@ -1,6 +1,6 @@
 //! Gear 1 is clocked by δ against its encoder's index: it stands at θ1 + δ, TE = f(θ1 + δ) − f(θ1) = i δ.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{Carrier, Effect, Estimate, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
 
 /// Gear 1 is clocked by δ against its encoder's index.
 pub(super) struct PhasingError;
@@ -35,6 +35,10 @@ impl Effect for PhasingError {
 
     fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("delta_rad", found.beta[0], found.std(0), "rad")]
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[HandTest::TurnOutputEncoder, HandTest::TurnInputEncoder]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

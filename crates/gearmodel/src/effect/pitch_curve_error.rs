@@ -3,8 +3,8 @@
 //! otherwise (a wrong ratio), TE = dk·θ1, which grows with every revolution and returns when the sense turns.
 
 use super::{
-    Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    Stated, StatedEffect, StatedError, Words,
+    Accumulates, Carrier, Effect, Estimate, Given, HandTest, OperatingPoint, Parameter, Parity, Plan, Rig, Shape,
+    Signature, Stated, StatedEffect, StatedError, Words,
 };
 
 /// Error of the pitch curves' form or closure.
@@ -62,6 +62,10 @@ impl Effect for PitchCurveError {
     fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let unit = if shape[..] == [1.0] { "rad/rad" } else { "" };
         vec![Parameter::number("dk", found.beta[0], found.std(0), unit)]
+    }
+
+    fn told_apart_by(&self) -> &'static [HandTest] {
+        &[HandTest::TurnOutputEncoder, HandTest::TurnInputEncoder]
     }
 
     fn parameter_names(&self) -> &'static [&'static str] {

@@ -153,6 +153,11 @@ class Diagnosis:
         return _section(self._fields["confusability"])  # type: ignore[no-any-return]
 
     @property
+    def settings(self) -> Section:
+        """Every number that was chosen for it, by step: ``docs/theory/settings.md`` says what each means."""
+        return _section(self._fields["settings"])  # type: ignore[no-any-return]
+
+    @property
     def curves(self) -> list[dict[str, Any]]:
         """Mean residual of every run over the driver's turn, before and after.
 

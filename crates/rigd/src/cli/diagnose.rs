@@ -43,7 +43,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn main(args: &Args) -> Exit {
-    let options = Options { known: args.known.clone(), exclude: args.exclude.clone() };
+    let options = Options { known: args.known.clone(), exclude: args.exclude.clone(), ..Options::default() };
     let answered = Logs::open(&args.logs, args.pair.as_deref()).and_then(|logs| {
         let diagnosed = logs.diagnose(&options)?;
         Ok((logs, diagnosed))
