@@ -46,6 +46,8 @@ mod gram;
 mod interpolation;
 mod localisation;
 mod normal_equations;
+#[cfg(test)]
+mod reference_tests;
 mod sectors;
 mod transients;
 mod waves;
