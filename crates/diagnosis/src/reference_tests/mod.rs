@@ -5,5 +5,7 @@
 //! the error of an approximation that the documentation names. No golden values.
 
 mod design_matrix;
+mod evidence;
+mod normal_equations;
 mod support;
 mod whitening;
