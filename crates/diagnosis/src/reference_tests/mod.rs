@@ -5,7 +5,11 @@
 //! the error of an approximation that the documentation names. No golden values.
 
 mod design_matrix;
+mod events;
 mod evidence;
+mod held_out;
+mod noise_estimates;
 mod normal_equations;
+mod search;
 mod support;
 mod whitening;
