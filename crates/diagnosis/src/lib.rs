@@ -51,6 +51,8 @@ mod localisation;
 mod normal_equations;
 mod options;
 mod pattern_words;
+#[cfg(test)]
+mod reference_tests;
 mod report;
 mod runs;
 mod sectors;
