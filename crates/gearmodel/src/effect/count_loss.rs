@@ -1,5 +1,5 @@
 //! A counter loses (or wins) counts at the output: steps of n counts, always the same way, that stay. TE = Σ steps so far ·
-//! 2π n/(counts a revolution). The shape lists the times of the steps, s (`gap::events` finds them); the amplitude is one
+//! 2π n/(counts a revolution). The shape lists the times of the steps, s (the diagnosis finds them); the amplitude is one
 //! step, positive where the reading grows. The parameter `counts` is what is lost: positive where the reading falls.
 //!
 //! Steps too small to be seen one by one, or too many, look like a ramp over the way of the driver: the shape [−1] is that, and its

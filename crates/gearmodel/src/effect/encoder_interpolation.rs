@@ -1,6 +1,6 @@
 //! Sub-divisional error: the signals within one line period are not true sine and cosine (offset: order 1 of the line,
 //! unequal amplitudes or quadrature: order 2), reading θ + a sin(h·L·θ − φ). Averaging over angle bins hides it; it is found
-//! on the samples (`gap::line_phase`). The shape is [order h, lines L].
+//! on the samples (`diagnosis::line_phase`). The shape is [order h, lines L].
 
 use super::{
     Carrier, Effect, Estimate, Given, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature,
