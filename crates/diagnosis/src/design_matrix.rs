@@ -15,7 +15,7 @@ use super::grid::Grid;
 use super::nuisance_patterns::Pattern;
 use super::settings::{DesignSettings, EvidenceSettings, Settings};
 use super::waves::{WAVES, waves};
-use gearmodel::effect::{Effect, Grain, OperatingPoint, Rig, Rows, Shape};
+use gearmodel::effect::{Effect, Grain, NominalRig, OperatingPoint, Rows, Shape};
 
 /// Column of the residual and of the zero in the design matrix.
 pub(super) const RESIDUAL: usize = 0;
@@ -41,7 +41,7 @@ pub enum Candidate {
 
 impl Candidate {
     /// Its columns before those that the plan cannot see are dropped.
-    fn width(&self, rig: &Rig) -> usize {
+    fn width(&self, rig: &NominalRig) -> usize {
         match self {
             Self::Effect { effect, shape, .. } => effect.width(rig, shape),
             Self::Unknown(pattern) => pattern.width(),
@@ -147,7 +147,7 @@ impl Base {
 }
 
 /// Rows of a candidate at operating points.
-fn rows(candidate: &Candidate, rig: &Rig, operating_points: &[OperatingPoint], width: usize) -> DMatrix<f64> {
+fn rows(candidate: &Candidate, rig: &NominalRig, operating_points: &[OperatingPoint], width: usize) -> DMatrix<f64> {
     let mut raw = DMatrix::zeros(operating_points.len(), width);
     let (mut row, mut part) = (vec![0.0; width], vec![0.0; width]);
     let grain = match candidate {
@@ -266,7 +266,7 @@ impl DesignMatrix {
     }
 
     /// Adds blocks; those that the plan cannot see are left out. Returns the numbers of those added.
-    pub fn add(&mut self, grid: &Grid, rig: &Rig, candidates: &[Candidate]) -> Vec<usize> {
+    pub fn add(&mut self, grid: &Grid, rig: &NominalRig, candidates: &[Candidate]) -> Vec<usize> {
         let mut numbers = Vec::new();
         let (evolving, others): (Vec<_>, Vec<_>) = candidates.iter().partition(|candidate| candidate.evolves());
         let width = |candidates: &[&Candidate]| candidates.iter().map(|candidate| candidate.width(rig)).sum();
@@ -287,7 +287,12 @@ impl DesignMatrix {
         numbers
     }
 
-    fn unit_columns(&self, grid: &Grid, rig: &Rig, candidate: &Candidate) -> Option<(Vec<Values>, DMatrix<f64>)> {
+    fn unit_columns(
+        &self,
+        grid: &Grid,
+        rig: &NominalRig,
+        candidate: &Candidate,
+    ) -> Option<(Vec<Values>, DMatrix<f64>)> {
         let (width, evolves) = (candidate.width(rig), candidate.evolves());
         let (operating_points, weights) =
             if evolves { (&grid.places, &grid.weight) } else { (&grid.cells, &self.base.cell_weight) };

@@ -11,7 +11,7 @@ use super::local_speed::{local_speeds, mean_speed};
 use super::reduce::{Point, ReducedRun};
 use super::settings::{ReductionSettings, Settings};
 use gearmodel::Direction;
-use gearmodel::effect::{OperatingPoint, Plan, RevolutionsByLoad, Rig};
+use gearmodel::effect::{MeasurementPlan, NominalRig, OperatingPoint, RevolutionsByLoad};
 
 /// A revolution, or the mean of neighbouring ones.
 #[derive(Clone, Debug)]
@@ -46,7 +46,7 @@ pub struct Grid {
     /// Place of every point, run after run.
     pub place_of_point: Vec<Vec<usize>>,
     /// What the recordings cover.
-    pub plan: Plan,
+    pub plan: MeasurementPlan,
     /// Bins a turn.
     pub bins: usize,
     /// Squared deviations of the samples from their place's mean, rad².
@@ -88,7 +88,7 @@ impl Sum {
 impl Grid {
     /// Bins the runs' points.
     #[must_use]
-    pub fn new(rig: &Rig, runs: &[ReducedRun], settings: &Settings) -> Self {
+    pub fn new(rig: &NominalRig, runs: &[ReducedRun], settings: &Settings) -> Self {
         let same_level = settings.reduction.same_level;
         let way_of = |run: &ReducedRun, point: &Point| (point.theta1_rad - run.points[0].theta1_rad).abs() / TAU;
         let turns: Vec<usize> = runs
@@ -119,7 +119,7 @@ impl Grid {
             rho_rad: Vec::new(),
             weight: Vec::new(),
             place_of_point: vec![Vec::new(); runs.len()],
-            plan: Plan::default(),
+            plan: MeasurementPlan::default(),
             bins,
             within_rad2: runs.iter().map(|run| run.within_rad2).sum(),
             samples: runs.iter().map(|run| run.samples).sum(),
@@ -174,7 +174,7 @@ impl Grid {
 
     fn add_run(
         &mut self,
-        rig: &Rig,
+        rig: &NominalRig,
         run: &ReducedRun,
         number: usize,
         frame: &RunFrame<'_>,
@@ -245,7 +245,7 @@ struct Binned {
 
 impl Binned {
     fn new(
-        rig: &Rig,
+        rig: &NominalRig,
         run: &ReducedRun,
         frame: &RunFrame<'_>,
         [revolutions, bins]: [usize; 2],
@@ -293,7 +293,7 @@ impl Binned {
     }
 
     /// Mean operating point of a bin.
-    fn operating_point(&self, key: usize, rig: &Rig, direction: Direction) -> OperatingPoint {
+    fn operating_point(&self, key: usize, rig: &NominalRig, direction: Direction) -> OperatingPoint {
         let sum = &self.sums[key];
         let w = sum.weight;
         let so_far = &self.revolutions_by_load[key];

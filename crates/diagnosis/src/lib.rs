@@ -2,14 +2,16 @@
 //!
 //! | step | file | what comes out |
 //! |---|---|---|
-//! | residual against the nominal model, by segments | `nominal`, `reduce`, `line_phase` | points, independent of the log's length |
-//! | revolutions × angle bins | `grid` | residual and operating point of every place |
-//! | columns of all effects and unknown patterns | `design_matrix`, `columns`, `nuisance_patterns` | sums from which every fit is made |
-//! | what does not repeat | `noise` | covariance by order, revolution and run |
+//! | all of them in order | `diagnose`, under `options` and `settings` | a diagnosis |
+//! | residual against the nominal model, by segments | `nominal`, `reduce`, `line_phase`, `documented` | points, independent of the log's length |
+//! | pieces joined, errors within the encoders' lines taken off | `runs`, `interpolation`, `line_errors` | runs |
+//! | revolutions × angle bins | `grid`, `levels`, `local_speed` | residual and operating point of every place |
+//! | knocks and tones taken off | `transients`, `tones`, `taken_off` | what angle does not carry |
+//! | columns of all effects and unknown patterns | `design_matrix`, `columns`, `nuisance_patterns`, `ghosts` | sums from which every fit is made |
+//! | what does not repeat | `noise`, `waves` | covariance by order, revolution and run |
 //! | how probable is a set of effects | `normal_equations`, `evidence`, `search` | models with their posterior |
-//! | tones, steps, knocks, what runs on with time | `events`, `transients`, `sectors`, `slow_tone` | what angle does not carry |
-//! | probabilities, groups | `posterior` | verdict |
-//! | the gap on runs not used for the fit | `cross_validation` | how far it closes |
+//! | search, steps, what runs on with time, shapes sharpened, until nothing changes | `solve/`, `steps`, `sectors`, `slow_tone` | the models that the residual allows |
+//! | probabilities → held-out gap → verdict → unknown → budget | `report/`, `posterior`, `cross_validation` | the answer |
 //! | where | `localisation` | tables and signature |
 //! | what to do next | `experiment_design` | experiments |
 //! | logs as points on one clock; logs with their model | `campaign_logs`, `logs` | what commands and the blind test share |

@@ -13,7 +13,7 @@ use super::line_errors;
 use super::line_phase::LineError;
 use super::noise::Noise;
 use super::settings::Settings;
-use gearmodel::effect::{Accumulates, Carrier, OperatingPoint, Parity, Rig, Signature, nearest_level};
+use gearmodel::effect::{Accumulates, Carrier, NominalRig, OperatingPoint, Parity, Signature, nearest_level};
 
 /// Sectors of a turn.
 const LOCATION_SECTORS: usize = 36;
@@ -26,7 +26,7 @@ const TIMES: usize = 24;
 
 /// What the localisation looks at.
 pub(super) struct Inputs<'a> {
-    pub(super) rig: &'a Rig,
+    pub(super) rig: &'a NominalRig,
     pub(super) grid: &'a Grid,
     pub(super) design: &'a DesignMatrix,
     pub(super) noise: &'a Noise,

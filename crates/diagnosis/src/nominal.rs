@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use gearmodel::contact::ContactModel;
 use gearmodel::effect::predict::Condition;
-use gearmodel::effect::{Carrier, Rig, Term};
+use gearmodel::effect::{Carrier, NominalRig, Term};
 use gearmodel::increment::common_normal;
 use gearmodel::{Direction, NominalModel};
 
@@ -15,7 +15,7 @@ const STEPS: usize = 1440;
 #[derive(Clone, Debug)]
 pub struct Nominal {
     model: NominalModel,
-    rig: Rig,
+    rig: NominalRig,
     /// Exact less first-order TE over a turn of the driver, rad, ccw then cw; empty where it cannot be tabulated.
     correction_rad: [Vec<f64>; 2],
 }
@@ -54,7 +54,7 @@ impl Nominal {
 
     /// The rig that effects are linearised about.
     #[must_use]
-    pub fn rig(&self) -> &Rig {
+    pub fn rig(&self) -> &NominalRig {
         &self.rig
     }
 

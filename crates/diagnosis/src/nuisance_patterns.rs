@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::settings::{NuisanceSettings, RunningOnSettings, Settings};
-use gearmodel::effect::{OperatingPoint, Plan, Shaft};
+use gearmodel::effect::{MeasurementPlan, OperatingPoint, Shaft};
 
 /// How a pattern scales with the condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +115,7 @@ fn order_step(span_rev: f64, settings: &NuisanceSettings) -> f64 {
 impl Pattern {
     /// The patterns tried under a plan.
     #[must_use]
-    pub fn all(plan: &Plan, settings: &NuisanceSettings) -> Vec<Self> {
+    pub fn all(plan: &MeasurementPlan, settings: &NuisanceSettings) -> Vec<Self> {
         let mut patterns = Vec::new();
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
         let both = plan.senses == [true, true];
@@ -182,7 +182,7 @@ impl Pattern {
 
     /// Levels that run on with time: those that settle in each run, from a fortieth of a run to half of it, and a random walk.
     #[must_use]
-    pub fn running_on(plan: &Plan, settings: &RunningOnSettings) -> (Vec<Self>, Option<Self>) {
+    pub fn running_on(plan: &MeasurementPlan, settings: &RunningOnSettings) -> (Vec<Self>, Option<Self>) {
         let run_s = plan.duration_s / plan.runs.max(1) as f64;
         let settling = (0..settings.settling_times).map(|n| Self::Settling {
             tau_s: 0.5 * run_s / settings.settling_ratio.powf(n as f64),

@@ -9,7 +9,7 @@ mod steps;
 mod wandering;
 mod weigh;
 
-use gearmodel::effect::Rig;
+use gearmodel::effect::NominalRig;
 
 use super::grid::Grid;
 use super::options::Options;
@@ -19,7 +19,7 @@ use state::State;
 pub(crate) use state::Solution;
 
 /// The models that a residual allows, with the noise and the design matrix that they were weighed in.
-pub(crate) fn solve<'a>(rig: &'a Rig, grid: Grid, taken_off: TakenOff, options: &'a Options) -> Solution<'a> {
+pub(crate) fn solve<'a>(rig: &'a NominalRig, grid: Grid, taken_off: TakenOff, options: &'a Options) -> Solution<'a> {
     let settings = &options.settings.search;
     let mut state = State::new(rig, grid, taken_off, options);
     for round in 0..settings.rounds {

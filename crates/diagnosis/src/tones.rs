@@ -10,7 +10,7 @@ use super::grid::Grid;
 use super::reduce::{Point, ReducedRun};
 use super::settings::{Settings, ToneSettings};
 use super::waves::{WAVES, waves};
-use gearmodel::effect::Rig;
+use gearmodel::effect::NominalRig;
 
 /// Frequencies of the search for tones.
 const TONE_STEPS: usize = 1 << 17;
@@ -26,7 +26,7 @@ pub struct Tone {
 
 /// Finds tones in what differs between revolutions of a condition, and takes them off the points. With them the grid of what is
 /// left.
-pub fn take_off(rig: &Rig, runs: &mut [ReducedRun], mut grid: Grid, settings: &Settings) -> (Vec<Tone>, Grid) {
+pub fn take_off(rig: &NominalRig, runs: &mut [ReducedRun], mut grid: Grid, settings: &Settings) -> (Vec<Tone>, Grid) {
     let own = &settings.tones;
     let mut tones = Vec::new();
     for band in [Band::High, Band::Low] {

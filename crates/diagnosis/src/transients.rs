@@ -236,12 +236,12 @@ fn leaves_a_step(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gearmodel::effect::{OperatingPoint, Rig};
+    use gearmodel::effect::{NominalRig, OperatingPoint};
 
     /// One run of four turns with the residual as given at (turn, bin).
     fn grid(rho: impl Fn(usize, usize) -> f64) -> Grid {
         let bins = 100;
-        let rig = Rig::new(pair(), gearmodel::Errors::default(), [None, None], None);
+        let rig = NominalRig::new(pair(), gearmodel::Errors::default(), [None, None], None);
         let mut grid = Grid::new(&rig, &[], &crate::Settings::default());
         grid.bins = bins;
         grid.cells = vec![OperatingPoint::default(); bins];

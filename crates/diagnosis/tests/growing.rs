@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use diagnosis::grid::Grid;
 use diagnosis::reduce::{Point, ReducedRun};
 
-use gearmodel::effect::{Estimate, OperatingPoint, Rig, Value, by_name};
+use gearmodel::effect::{Estimate, NominalRig, OperatingPoint, Value, by_name};
 use gearmodel::{Direction, EllipticalSpec, Errors, GearPair};
 use nalgebra::DMatrix;
 
@@ -20,12 +20,12 @@ const RUNS: [(f64, Direction, f64, f64); 5] = [
     (240.0, Direction::Cw, 10.0, 3.0),
 ];
 
-fn document_rig() -> Rig {
+fn document_rig() -> NominalRig {
     let pair = GearPair::elliptical(&EllipticalSpec::default()).unwrap();
-    Rig::new(pair, Errors::default(), [None, None], Some(7.2e6))
+    NominalRig::new(pair, Errors::default(), [None, None], Some(7.2e6))
 }
 
-fn row(rig: &Rig, name: &str, shape: &[f64], at: &OperatingPoint) -> Vec<f64> {
+fn row(rig: &NominalRig, name: &str, shape: &[f64], at: &OperatingPoint) -> Vec<f64> {
     let (effect, shape) = (by_name(name).unwrap(), shape.to_vec());
     let mut row = vec![0.0; effect.width(rig, &shape)];
     effect.row(rig, &shape, at, &mut row);
@@ -37,7 +37,7 @@ fn estimate(beta: Vec<f64>) -> Estimate {
     Estimate { beta, covariance }
 }
 
-fn campaign(rig: &Rig) -> Grid {
+fn campaign(rig: &NominalRig) -> Grid {
     let speed_rpm = 6.0;
     let runs: Vec<ReducedRun> = RUNS
         .iter()

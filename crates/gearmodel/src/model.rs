@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::effect::predict::Condition;
-use crate::effect::{Documented, Rig, StatedEffect};
+use crate::effect::{Documented, NominalRig, StatedEffect};
 use crate::increment::common_normal;
 use crate::{Direction, Errors, GearPair, GeometryError, MeshPoint};
 
@@ -46,8 +46,8 @@ impl NominalModel {
 
     /// The rig that effects are linearised about: this pair with its documented errors, and the encoders as far as they are known.
     #[must_use]
-    pub fn rig(&self, lines: [Option<f64>; 2], output_counts_per_rev: Option<f64>) -> Rig {
-        Rig::new(self.pair.clone(), self.errors, lines, output_counts_per_rev)
+    pub fn rig(&self, lines: [Option<f64>; 2], output_counts_per_rev: Option<f64>) -> NominalRig {
+        NominalRig::new(self.pair.clone(), self.errors, lines, output_counts_per_rev)
     }
 
     /// Predicted TE at θ1, rad: eccentricities and designed backlash along the common normal, the wind-up under

@@ -8,7 +8,7 @@
 //! integral done another way. A candidate's scale is averaged over 1 µrad · 2ⁿ, n = 0 … 10; a set's scales are where
 //! the evidence is largest.
 
-use gearmodel::effect::Rig;
+use gearmodel::effect::NominalRig;
 use nalgebra::{DMatrix, DVector};
 
 use super::support::{
@@ -35,7 +35,7 @@ struct Case {
 
 impl Case {
     /// Scatter, and traces of a pool's columns.
-    fn new(rig: &Rig, grid: Grid, candidates: &[Candidate], amplitudes: &[(usize, f64)]) -> Self {
+    fn new(rig: &NominalRig, grid: Grid, candidates: &[Candidate], amplitudes: &[(usize, f64)]) -> Self {
         let (mut grid, noise) = with_scatter(grid, 31);
         let columns = pool(rig, &grid, candidates);
         add_trace(&mut grid, &columns, amplitudes);
@@ -125,7 +125,7 @@ fn log_sum(logs: &[f64]) -> f64 {
 }
 
 /// Two runs of both senses and two loads, whole turns.
-fn both_senses(rig: &Rig) -> Grid {
+fn both_senses(rig: &NominalRig) -> Grid {
     grid(rig, &[full(Ccw, 5.0, 2, 30), full(Cw, 15.0, 2, 30)], 30, uneven)
 }
 

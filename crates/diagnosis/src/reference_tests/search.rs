@@ -5,7 +5,7 @@
 //! w_m ∝ exp(0.85 (score_m − best)),     p(effect) = Σ of the weights of the sets that contain it
 //! ```
 
-use gearmodel::effect::{LIBRARY, Rig};
+use gearmodel::effect::{LIBRARY, NominalRig};
 
 use super::support::{
     Random, TRUTH, Truth, add_trace, draw, effect, estimate, full, grid, level, order, pool, rig, uneven,
@@ -59,7 +59,7 @@ fn all_subsets(pool: &DesignMatrix, whitened: &Whitened) -> Vec<Model> {
 }
 
 /// Effects that look like one another and like the patterns: orders 1 and 2 of either shaft, levels; and one more.
-fn candidates(rig: &Rig, grid: &Grid, last: Candidate) -> Vec<Candidate> {
+fn candidates(rig: &NominalRig, grid: &Grid, last: Candidate) -> Vec<Candidate> {
     vec![
         effect(rig, grid, LIBRARY[0].name()),
         effect(rig, grid, LIBRARY[1].name()),

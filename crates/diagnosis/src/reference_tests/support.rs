@@ -3,7 +3,7 @@
 use std::f64::consts::{SQRT_2, TAU};
 use std::ops::Range;
 
-use gearmodel::effect::{LIBRARY, OperatingPoint, Rig, Shaft, by_name};
+use gearmodel::effect::{LIBRARY, NominalRig, OperatingPoint, Shaft, by_name};
 use gearmodel::{Direction, EllipticalSpec, Errors, GearPair};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand::{RngExt, SeedableRng};
@@ -38,13 +38,13 @@ pub(super) fn full(direction: Direction, load_nm: f64, revolutions: usize, bins:
 }
 
 /// The default elliptical pair.
-pub(super) fn rig() -> Rig {
+pub(super) fn rig() -> NominalRig {
     let pair = GearPair::elliptical(&EllipticalSpec::default()).unwrap();
-    Rig::new(pair, Errors::default(), [None, None], None)
+    NominalRig::new(pair, Errors::default(), [None, None], None)
 }
 
 /// The grid of some runs with a residual of zero; `samples` at each place by its number.
-pub(super) fn grid(rig: &Rig, runs: &[Run], bins: usize, samples: impl Fn(usize) -> f64) -> Grid {
+pub(super) fn grid(rig: &NominalRig, runs: &[Run], bins: usize, samples: impl Fn(usize) -> f64) -> Grid {
     let mut grid = binned(rig, &[]);
     grid.bins = bins;
     let (mut start_s, mut way_rev) = (0.0, 0.0);
@@ -102,7 +102,7 @@ pub(super) fn uneven(place: usize) -> f64 {
 }
 
 /// Two runs in both senses, revolutions whole and in part.
-pub(super) fn two_runs(rig: &Rig) -> Grid {
+pub(super) fn two_runs(rig: &NominalRig) -> Grid {
     let bins = 40;
     let runs = [
         Run { direction: Direction::Ccw, load_nm: 5.0, revolutions: vec![0..bins, 0..bins, 0..23] },
@@ -127,19 +127,19 @@ pub(super) fn smooth(sense: f64) -> Pattern {
 }
 
 /// An effect of the library at the first of its shapes.
-pub(super) fn effect(rig: &Rig, grid: &Grid, name: &str) -> Candidate {
+pub(super) fn effect(rig: &NominalRig, grid: &Grid, name: &str) -> Candidate {
     let effect = by_name(name).unwrap();
     let number = LIBRARY.iter().position(|e| e.name() == name).unwrap();
     Candidate::Effect { effect, number, shape: effect.shapes(rig, &grid.plan).swap_remove(0), cost_nats: 0.0 }
 }
 
 /// What the points of runs are binned to.
-pub(super) fn binned(rig: &Rig, runs: &[ReducedRun]) -> Grid {
+pub(super) fn binned(rig: &NominalRig, runs: &[ReducedRun]) -> Grid {
     Grid::new(rig, runs, &Settings::default())
 }
 
 /// The pool of some candidates over a grid with a residual.
-pub(super) fn pool(rig: &Rig, grid: &Grid, candidates: &[Candidate]) -> DesignMatrix {
+pub(super) fn pool(rig: &NominalRig, grid: &Grid, candidates: &[Candidate]) -> DesignMatrix {
     let mut pool = DesignMatrix::new(grid, &Settings::default());
     assert_eq!(pool.add(grid, rig, candidates).len(), candidates.len(), "the plan shows all of them");
     pool

@@ -5,7 +5,7 @@
 //! ```
 
 use gearmodel::Direction::{Ccw, Cw};
-use gearmodel::effect::Rig;
+use gearmodel::effect::NominalRig;
 
 use super::support::{
     Dense, Run, condition, covariance, design, full, grid, level, order, pool, residual, rig, spread_of, two_runs,
@@ -17,7 +17,7 @@ use crate::grid::Grid;
 use crate::nuisance_patterns::{Pattern, Weight};
 
 /// Plans: two runs of uneven coverage, one run, one run a condition of one revolution each.
-fn grids(rig: &Rig) -> [Grid; 3] {
+fn grids(rig: &NominalRig) -> [Grid; 3] {
     let bins = 40;
     let one = [Run { direction: Ccw, load_nm: 10.0, revolutions: vec![0..bins, 3..bins, 0..17] }];
     let conditions = [(Ccw, 5.0), (Ccw, 15.0), (Cw, 5.0), (Cw, 15.0)].map(|(sense, load)| full(sense, load, 1, bins));

@@ -1,6 +1,6 @@
 //! What the steps of a report look at.
 
-use gearmodel::effect::{Estimate, Rig};
+use gearmodel::effect::{Estimate, NominalRig};
 
 use crate::design_matrix::{Candidate, DesignMatrix};
 use crate::evidence;
@@ -13,7 +13,7 @@ use crate::taken_off::TakenOff;
 
 /// The best model with all that it was found from.
 pub(super) struct Context<'a> {
-    pub(super) rig: &'a Rig,
+    pub(super) rig: &'a NominalRig,
     pub(super) grid: &'a Grid,
     pub(super) design: &'a DesignMatrix,
     pub(super) noise: &'a Noise,

@@ -1,6 +1,6 @@
 //! What is known at a moment: the grid, its design matrix and noise, and the best model so far.
 
-use gearmodel::effect::{Accumulates, LIBRARY, Rig};
+use gearmodel::effect::{Accumulates, LIBRARY, NominalRig};
 
 use crate::design_matrix::{Candidate, DesignMatrix};
 use crate::evidence;
@@ -15,7 +15,7 @@ use crate::taken_off::TakenOff;
 
 /// The state of a diagnosis under way.
 pub(super) struct State<'a> {
-    pub(super) rig: &'a Rig,
+    pub(super) rig: &'a NominalRig,
     pub(super) options: &'a Options,
     pub(super) taken_off: TakenOff,
     pub(super) grid: Grid,
@@ -29,8 +29,8 @@ pub(super) struct State<'a> {
 
 /// What was found, with all that it was found from.
 pub(crate) struct Solution<'a> {
-    /// Rig.
-    pub(crate) rig: &'a Rig,
+    /// The rig.
+    pub(crate) rig: &'a NominalRig,
     /// What was said beforehand.
     pub(crate) options: &'a Options,
     /// What was taken off before.
@@ -49,7 +49,7 @@ pub(crate) struct Solution<'a> {
 
 impl<'a> State<'a> {
     /// All candidates that the rig and the plan allow; nothing found yet.
-    pub(super) fn new(rig: &'a Rig, grid: Grid, taken_off: TakenOff, options: &'a Options) -> Self {
+    pub(super) fn new(rig: &'a NominalRig, grid: Grid, taken_off: TakenOff, options: &'a Options) -> Self {
         let settings = &options.settings;
         let mut design = DesignMatrix::new(&grid, settings);
         let mut candidates = Vec::new();

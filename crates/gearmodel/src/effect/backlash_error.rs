@@ -1,7 +1,9 @@
 //! Tooth thinning differs from the designed backlash by dj along the pitch curve:
 //! TE = −dir·(dj/2) cos α/A.
 
-use super::{Carrier, Effect, Estimate, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{
+    Carrier, Effect, Estimate, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature, Words,
+};
 
 /// Tooth thinning differs from the designed backlash by dj along the pitch curve.
 pub(super) struct BacklashError;
@@ -26,15 +28,15 @@ impl Effect for BacklashError {
         Signature::steady(Carrier::Input, Parity::Odd)
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
-    fn row(&self, rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense * 0.5 * rig.pair().pressure_angle_rad().cos() / at.arm_mm;
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("dj_mm", found.beta[0], found.std(0), "mm")]
     }
 

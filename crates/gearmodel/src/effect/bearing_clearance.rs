@@ -1,7 +1,9 @@
 //! Bearings with play: the load pushes the gear aside by c along the common normal, TE = −dir·c/A, whatever its size.
 //! The same trace as a backlash error of 2c/cos α.
 
-use super::{Carrier, Effect, Estimate, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{
+    Carrier, Effect, Estimate, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature, Words,
+};
 
 /// Bearings with play.
 pub(super) struct BearingClearance;
@@ -23,7 +25,7 @@ impl Effect for BearingClearance {
         Signature::steady(Carrier::Input, Parity::Odd)
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
@@ -31,11 +33,11 @@ impl Effect for BearingClearance {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense / at.arm_mm;
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("c_mm", found.beta[0], found.std(0), "mm")]
     }
 

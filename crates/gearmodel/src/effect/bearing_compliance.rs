@@ -1,7 +1,9 @@
 //! Bearings give way along the common normal, c mm a newton: with the tooth force F = 1000 T/A (T in N·m, A in mm),
 //! TE = −dir·1000 T c/A².
 
-use super::{Carrier, Effect, Estimate, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{
+    Carrier, Effect, Estimate, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature, Words,
+};
 
 /// Bearings give way along the common normal, c mm a newton.
 pub(super) struct BearingCompliance;
@@ -27,11 +29,11 @@ impl Effect for BearingCompliance {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense * 1000.0 * at.load_nm / (at.arm_mm * at.arm_mm);
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("c_mm_per_n", found.beta[0], found.std(0), "mm/N")]
     }
 

@@ -2,8 +2,8 @@
 //! TE = −dir·T·C(θ1)·ρ sin(nθ2 − φ), C the documented compliance of the train. The shape is [n].
 
 use super::{
-    Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shaft, Shape, Signature,
-    StatedError, Words,
+    Carrier, Effect, Estimate, Given, MeasurementPlan, NominalRig, OperatingPoint, Parameter, Parity, Shaft, Shape,
+    Signature, StatedError, Words,
 };
 
 /// Torque ripple of the brake.
@@ -26,18 +26,18 @@ impl Effect for BrakeTorqueRipple {
         Signature::steady(Carrier::Output, Parity::Odd).with_load(1.0)
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
-    fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
+    fn shapes(&self, _rig: &NominalRig, plan: &MeasurementPlan) -> Vec<Shape> {
         if plan.loads_nm.last().is_none_or(|load| *load <= 0.0) {
             return Vec::new();
         }
         (1..=12).map(|order| vec![f64::from(order)]).collect()
     }
 
-    fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
+    fn width(&self, _rig: &NominalRig, _shape: &Shape) -> usize {
         2
     }
 
@@ -45,7 +45,7 @@ impl Effect for BrakeTorqueRipple {
         Some((Shaft::Output, *shape.first()?))
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let [order] = shape[..] else { return };
         let windup_rad = -at.sense * at.load_nm * rig.train_compliance_rad_per_nm(at);
         let (sin, cos) = (order * at.theta2_rad).sin_cos();
@@ -53,7 +53,7 @@ impl Effect for BrakeTorqueRipple {
         row[1] = windup_rad * cos;
     }
 
-    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let mut parameters = found.polar(0).parameters("rho", "");
         parameters.insert(1, Parameter::grid("n", shape[0], ""));
         parameters
@@ -63,7 +63,7 @@ impl Effect for BrakeTorqueRipple {
         &["rho", "n", "phase_rad"]
     }
 
-    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         Ok((vec![given.number_in("n", 1.0, 1e4)?], given.polar("rho")?))
     }
 }

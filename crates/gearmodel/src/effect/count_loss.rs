@@ -8,8 +8,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    Stated, StatedEffect, StatedError, Value, Words,
+    Accumulates, Carrier, Effect, Estimate, Given, MeasurementPlan, NominalRig, OperatingPoint, Parameter, Parity,
+    Shape, Signature, Stated, StatedEffect, StatedError, Value, Words,
 };
 
 /// Stands for steps spread evenly over the way; times are not negative.
@@ -48,16 +48,16 @@ impl Effect for CountLoss {
         Signature::steady(Carrier::None, Parity::Even).accumulating(Accumulates::PerRevolution)
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
     /// Only the ramp before the residual was searched for steps.
-    fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
+    fn shapes(&self, _rig: &NominalRig, plan: &MeasurementPlan) -> Vec<Shape> {
         if plan.revolutions > LEAST_WAY_REV { vec![vec![RAMP]] } else { Vec::new() }
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = if shape[..] == [RAMP] { at.way_rev } else { steps_so_far(shape, at.time_s) };
     }
 
@@ -65,7 +65,7 @@ impl Effect for CountLoss {
         true
     }
 
-    fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, rig: &NominalRig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let mut parameters = Vec::new();
         if shape[..] == [RAMP] {
             let (rate_rad, std_rad) = (found.beta[0], found.std(0));
@@ -110,7 +110,7 @@ impl Effect for CountLoss {
         &["counts", "step_rad", "steps", "per_rev", "times_s", "rate_rad_per_rev"]
     }
 
-    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         if given.has("rate_rad_per_rev") {
             return Ok((vec![RAMP], vec![given.number("rate_rad_per_rev")?]));
         }
@@ -125,7 +125,7 @@ impl Effect for CountLoss {
         Ok((times_s, vec![step_rad]))
     }
 
-    fn stated(&self, _rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+    fn stated(&self, _rig: &NominalRig, shape: &Shape, beta: &[f64]) -> StatedEffect {
         if shape[..] == [RAMP] {
             return [("rate_rad_per_rev".to_owned(), Stated::Number(beta[0]))].into();
         }

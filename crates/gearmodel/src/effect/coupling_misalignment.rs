@@ -3,8 +3,8 @@
 //! seen as i times that.
 
 use super::{
-    Effect, Estimate, Given, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError,
-    Words,
+    Effect, Estimate, Given, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shaft, Shape, Signature,
+    StatedError, Words,
 };
 
 /// Misalignment of the coupling in the input or output shaft.
@@ -37,19 +37,19 @@ impl Effect for CouplingMisalignment {
         Signature::steady(self.0.carrier(), Parity::Even)
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
-    fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
+    fn width(&self, _rig: &NominalRig, _shape: &Shape) -> usize {
         2
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         at.wave(self.0, 2.0, if self.0 == Shaft::Input { at.ratio } else { 1.0 }, row);
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let polar = found.polar(0);
         // Amplitude β²/4: β = 2 √a, dβ = da/√a.
         let root = polar.amplitude.sqrt().max(f64::MIN_POSITIVE);
@@ -70,7 +70,7 @@ impl Effect for CouplingMisalignment {
         &["beta_rad", "phase_rad"]
     }
 
-    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         // The amplitude of order 2 is β²/4.
         let (beta_rad, phase_rad) = (given.number_in("beta_rad", 0.0, 1.0)?, given.number("phase_rad")?);
         let amplitude_rad = 0.25 * beta_rad * beta_rad;

@@ -2,7 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::{Estimate, Grain, HandTest, OperatingPoint, Parameter, Plan, Rig, Shaft, Signature, Words};
+use super::{
+    Estimate, Grain, HandTest, MeasurementPlan, NominalRig, OperatingPoint, Parameter, Shaft, Signature, Words,
+};
 use crate::stated::{Given, StatedEffect, StatedError};
 
 /// Values of the parameters in which a trace is not linear; which they are, the effect knows. Empty where there are none.
@@ -37,17 +39,17 @@ pub trait Effect: Sync {
     fn signature(&self) -> Signature;
 
     /// The same for one shape, with the sector where the trace is local.
-    fn signature_of(&self, _rig: &Rig, _shape: &Shape) -> Signature {
+    fn signature_of(&self, _rig: &NominalRig, _shape: &Shape) -> Signature {
         self.signature()
     }
 
     /// Whether this rig can have it.
-    fn applies(&self, rig: &Rig) -> bool {
+    fn applies(&self, rig: &NominalRig) -> bool {
         rig.pair().has_teeth()
     }
 
     /// Grid of shapes to search under a plan; one empty shape where the trace is linear in all parameters.
-    fn shapes(&self, _rig: &Rig, _plan: &Plan) -> Vec<Shape> {
+    fn shapes(&self, _rig: &NominalRig, _plan: &MeasurementPlan) -> Vec<Shape> {
         vec![Vec::new()]
     }
 
@@ -57,20 +59,20 @@ pub trait Effect: Sync {
     }
 
     /// A better shape given the amplitudes found, where the trace depends on its own size.
-    fn refine(&self, _rig: &Rig, _shape: &Shape, _beta: &[f64]) -> Option<Shape> {
+    fn refine(&self, _rig: &NominalRig, _shape: &Shape, _beta: &[f64]) -> Option<Shape> {
         None
     }
 
     /// Columns of the block.
-    fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
+    fn width(&self, _rig: &NominalRig, _shape: &Shape) -> usize {
         1
     }
 
     /// Trace per unit amplitude at a station, rad; `row` has `width` entries, all zero on entry.
-    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]);
+    fn row(&self, rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]);
 
     /// [`Effect::row`] for station after station, with what they share worked out once.
-    fn rows<'a>(&'a self, rig: &'a Rig, shape: &'a Shape) -> Rows<'a> {
+    fn rows<'a>(&'a self, rig: &'a NominalRig, shape: &'a Shape) -> Rows<'a> {
         Box::new(move |at, row| self.row(rig, shape, at, row))
     }
 
@@ -120,7 +122,7 @@ pub trait Effect: Sync {
     }
 
     /// Parameters in the contract's names and units.
-    fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter>;
+    fn parameters(&self, rig: &NominalRig, shape: &Shape, found: &Estimate) -> Vec<Parameter>;
 
     /// The parameter that only follows from those found with the revolutions of a campaign.
     fn over_a_campaign(&self, _found: &[Parameter], _revolutions: f64) -> Option<Parameter> {
@@ -139,18 +141,18 @@ pub trait Effect: Sync {
     ///
     /// # Errors
     /// [`StatedError`] that names the parameter.
-    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let beta = given.names().iter().map(|name| given.number(name)).collect::<Result<_, _>>()?;
         Ok((Shape::new(), beta))
     }
 
     /// The parameters that fix the trace.
-    fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+    fn stated(&self, rig: &NominalRig, shape: &Shape, beta: &[f64]) -> StatedEffect {
         self.reported(rig, shape, beta)
     }
 
     /// The parameters of [`Effect::parameters`], as far as a file may state them.
-    fn reported(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+    fn reported(&self, rig: &NominalRig, shape: &Shape, beta: &[f64]) -> StatedEffect {
         let known = Estimate { beta: beta.to_vec(), covariance: DMatrix::zeros(beta.len(), beta.len()) };
         self.parameters(rig, shape, &known)
             .into_iter()

@@ -4,7 +4,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Effect, Fold, Given, LIBRARY, OperatingPoint, Rig, Shaft, Shape, StatedEffect, StatedError, by_name};
+use super::{
+    Effect, Fold, Given, LIBRARY, NominalRig, OperatingPoint, Shaft, Shape, StatedEffect, StatedError, by_name,
+};
 use crate::{Errors, GearPair, GeometryError};
 
 /// An effect with its shape and amplitudes.
@@ -39,7 +41,7 @@ impl Term {
     ///
     /// # Errors
     /// [`StatedError`] when the effect is unknown, cannot be on this rig, or its parameters do not fix it.
-    pub fn from_stated(rig: &Rig, name: &str, stated: &StatedEffect) -> Result<Self, StatedError> {
+    pub fn from_stated(rig: &NominalRig, name: &str, stated: &StatedEffect) -> Result<Self, StatedError> {
         let effect = by_name(name).ok_or_else(|| StatedError::Effect {
             effect: name.to_owned(),
             allowed: LIBRARY.iter().map(|effect| effect.name()).collect::<Vec<_>>().join(", "),
@@ -54,20 +56,20 @@ impl Term {
 
     /// The parameters that fix it.
     #[must_use]
-    pub fn stated(&self, rig: &Rig) -> StatedEffect {
+    pub fn stated(&self, rig: &NominalRig) -> StatedEffect {
         self.effect.stated(rig, &self.shape, &self.beta)
     }
 
     /// TE at a station, rad: columns · β.
     #[must_use]
-    pub fn te_rad(&self, rig: &Rig, at: &OperatingPoint) -> f64 {
+    pub fn te_rad(&self, rig: &NominalRig, at: &OperatingPoint) -> f64 {
         let mut row = vec![0.0; self.beta.len()];
         self.effect.row(rig, &self.shape, at, &mut row);
         row.iter().zip(&self.beta).map(|(x, b)| x * b).sum()
     }
 
     /// Adds another term of the same effect where one term can hold both; false where they stay two.
-    pub fn add(&mut self, rig: &Rig, other: &Self) -> bool {
+    pub fn add(&mut self, rig: &NominalRig, other: &Self) -> bool {
         if self.effect.name() != other.effect.name() || self.beta.len() != other.beta.len() {
             return false;
         }
@@ -108,7 +110,7 @@ pub struct Documented(Option<Arc<Inner>>);
 #[derive(Debug)]
 struct Inner {
     /// What the effects are linearised about: the pair with its documented errors.
-    rig: Rig,
+    rig: NominalRig,
     terms: Vec<Term>,
 }
 
@@ -131,7 +133,7 @@ impl Documented {
         if stated.is_empty() {
             return Ok(Self::default());
         }
-        let rig = |errors: Errors| Rig::new(pair.clone(), errors, [None, None], None);
+        let rig = |errors: Errors| NominalRig::new(pair.clone(), errors, [None, None], None);
         let plain = rig(*errors);
         let mut terms = Vec::new();
         for (name, tables) in stated {
@@ -159,7 +161,7 @@ impl Documented {
 
     /// The rig that they are linearised about; `None` where there are none.
     #[must_use]
-    pub fn rig(&self) -> Option<&Rig> {
+    pub fn rig(&self) -> Option<&NominalRig> {
         self.0.as_ref().map(|inner| &inner.rig)
     }
 

@@ -3,8 +3,8 @@
 //! encoder.
 
 use super::{
-    Effect, Estimate, Given, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, StatedError,
-    Words,
+    Effect, Estimate, Given, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shaft, Shape, Signature,
+    StatedError, Words,
 };
 
 /// Order 1 or 2 of the input or output encoder's disc.
@@ -66,19 +66,19 @@ impl Effect for EncoderDisc {
         Signature::steady(self.shaft.carrier(), Parity::Even)
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
-    fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
+    fn width(&self, _rig: &NominalRig, _shape: &Shape) -> usize {
         2
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         at.reading_error(self.shaft, f64::from(self.order as u8), row);
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         found.polar(0).parameters("eps", "")
     }
 
@@ -97,7 +97,7 @@ impl Effect for EncoderDisc {
         &["eps", "phase_rad"]
     }
 
-    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         Ok((Shape::new(), given.polar("eps")?))
     }
 }

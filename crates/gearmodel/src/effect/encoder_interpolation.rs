@@ -3,7 +3,7 @@
 //! on the samples (by the diagnosis). The shape is [order h, lines L].
 
 use super::{
-    Carrier, Effect, Estimate, Given, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature,
+    Carrier, Effect, Estimate, Given, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shaft, Shape, Signature,
     StatedError, Words,
 };
 
@@ -43,7 +43,7 @@ impl Effect for EncoderInterpolation {
         Signature::steady(Carrier::EncoderLine, Parity::Even)
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
@@ -52,21 +52,21 @@ impl Effect for EncoderInterpolation {
     }
 
     /// None before the samples were searched for lines.
-    fn shapes(&self, _rig: &Rig, _plan: &super::Plan) -> Vec<Shape> {
+    fn shapes(&self, _rig: &NominalRig, _plan: &super::MeasurementPlan) -> Vec<Shape> {
         Vec::new()
     }
 
-    fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
+    fn width(&self, _rig: &NominalRig, _shape: &Shape) -> usize {
         2
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         if let [order, lines] = shape[..] {
             at.reading_error(self.0, order * lines, row);
         }
     }
 
-    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let mut parameters = found.polar(0).parameters("a_rad", "rad");
         if let [order, lines] = shape[..] {
             parameters.insert(1, Parameter::grid("lines", lines, ""));
@@ -83,7 +83,7 @@ impl Effect for EncoderInterpolation {
         &["a_rad", "lines", "phase_rad", "order"]
     }
 
-    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let order = if given.has("order") { given.number_in("order", 1.0, 100.0)? } else { 1.0 };
         Ok((vec![order, given.number_in("lines", 1.0, 1e9)?], given.polar("a_rad")?))
     }

@@ -1,7 +1,9 @@
 //! Drag of seals and bearings winds the shafts up beside the load: TE = −dir·M·[C_out + C_in i² + C_mesh/A²] with the
 //! documented compliances, or at 1 rad/(N·m) where there are none.
 
-use super::{Carrier, Effect, Estimate, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{
+    Carrier, Effect, Estimate, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature, Words,
+};
 
 /// Drag of seals and bearings winds the shafts up beside the load.
 pub(super) struct FrictionWindup;
@@ -23,7 +25,7 @@ impl Effect for FrictionWindup {
         Signature::steady(Carrier::Input, Parity::Odd)
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
@@ -31,11 +33,11 @@ impl Effect for FrictionWindup {
         true
     }
 
-    fn row(&self, rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense * rig.train_compliance_rad_per_nm(at);
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("torque_nm", found.beta[0], found.std(0), "N.m")]
     }
 

@@ -3,7 +3,9 @@
 //! By the increment along the common normal, with a = dir·(α ∓ μ) (`increment::common_normal`):
 //! TE = [dx sin(θ1 + a) + dy cos(θ1 + a)]/A for gear 1, [dx sin(θ2 − a) + dy cos(θ2 − a)]/A for gear 2.
 
-use super::{Effect, Estimate, Fold, HandTest, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, Words};
+use super::{
+    Effect, Estimate, Fold, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shaft, Shape, Signature, Words,
+};
 
 /// Eccentricity of gear 1 (input) or gear 2 (output) against the documented one.
 pub(super) struct GearEccentricity(pub(super) Shaft);
@@ -41,11 +43,11 @@ impl Effect for GearEccentricity {
         Signature::steady(self.0.carrier(), Parity::Mixed)
     }
 
-    fn width(&self, _rig: &Rig, _shape: &Shape) -> usize {
+    fn width(&self, _rig: &NominalRig, _shape: &Shape) -> usize {
         2
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let lean = at.sense * at.pressure_rad;
         let angle = match self.0 {
             Shaft::Input => at.theta1_rad + lean,
@@ -56,7 +58,7 @@ impl Effect for GearEccentricity {
         row[1] = cos / at.arm_mm;
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![
             Parameter::number("dx_mm", found.beta[0], found.std(0), "mm"),
             Parameter::number("dy_mm", found.beta[1], found.std(1), "mm"),

@@ -1,7 +1,7 @@
 //! The teeth give way along the common normal: TE = −dir·T·C/A².
 
 use super::{
-    Carrier, Effect, Estimate, Fold, HandTest, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words,
+    Carrier, Effect, Estimate, Fold, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature, Words,
 };
 
 /// The teeth give way along the common normal.
@@ -28,11 +28,11 @@ impl Effect for MeshCompliance {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = -at.sense * at.load_nm / (at.arm_mm * at.arm_mm);
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("c_mm2_rad_per_nm", found.beta[0], found.std(0), "mm2.rad/(N.m)")]
     }
 

@@ -3,8 +3,8 @@
 //! the segment on one pair begins at u = start. The empty shape takes the segments from the tips of the documented teeth.
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
-    StatedEffect, StatedError, Words,
+    Carrier, Effect, Estimate, Given, Grain, MeasurementPlan, NominalRig, OperatingPoint, Parameter, Parity, Shape,
+    Signature, Stated, StatedEffect, StatedError, Words,
 };
 
 /// Variation of the mesh compliance over the pitch.
@@ -33,7 +33,7 @@ impl Effect for MeshStiffnessVariation {
         Signature::steady(Carrier::Mesh, Parity::Mixed).with_load(1.0)
     }
 
-    fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
+    fn shapes(&self, _rig: &NominalRig, plan: &MeasurementPlan) -> Vec<Shape> {
         if plan.loads_nm.last().is_none_or(|load| *load <= 0.0) {
             return Vec::new();
         }
@@ -63,7 +63,7 @@ impl Effect for MeshStiffnessVariation {
         Grain::Sharp
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let weight = if let [duty, start] = shape[..] {
             let from_start = at.pitches - start;
             if from_start - from_start.floor() < duty { 1.0 - duty } else { -duty }
@@ -73,7 +73,7 @@ impl Effect for MeshStiffnessVariation {
         row[0] = -at.sense * at.load_nm * weight / (at.arm_mm * at.arm_mm);
     }
 
-    fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, rig: &NominalRig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let duty = match shape.first() {
             Some(duty) => Parameter::grid("duty", *duty, ""),
             None => Parameter::derived("duty", rig.mean_single_pair_duty(), ""),
@@ -85,7 +85,7 @@ impl Effect for MeshStiffnessVariation {
         &["c_mm2_rad_per_nm", "duty", "start_pitches"]
     }
 
-    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let shape = if given.has("duty") {
             let duty = given.number_in("duty", 0.0, 1.0)?;
             // Where nothing else is said the segment on one pair lies about the pitch point.
@@ -96,7 +96,7 @@ impl Effect for MeshStiffnessVariation {
         Ok((shape, vec![given.number("c_mm2_rad_per_nm")?]))
     }
 
-    fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+    fn stated(&self, rig: &NominalRig, shape: &Shape, beta: &[f64]) -> StatedEffect {
         let mut stated = self.reported(rig, shape, beta);
         match shape[..] {
             [_, start] => stated.insert("start_pitches".to_owned(), Stated::Number(start)),

@@ -158,7 +158,7 @@ impl Grain {
 
 /// What the recordings cover.
 #[derive(Clone, Debug, Default)]
-pub struct Plan {
+pub struct MeasurementPlan {
     /// Distinct loads, N·m, ascending.
     pub loads_nm: Vec<f64>,
     /// Distinct driver speeds, rad/s, ascending.

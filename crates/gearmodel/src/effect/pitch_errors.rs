@@ -10,14 +10,14 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, StatedError,
-    Words,
+    Carrier, Effect, Estimate, Given, Grain, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature,
+    StatedError, Words,
 };
 
 /// Pitch errors of the driver's teeth, flank by flank.
 pub(super) struct PitchErrors;
 
-fn teeth(rig: &Rig) -> usize {
+fn teeth(rig: &NominalRig) -> usize {
     rig.pair().teeth().0 as usize
 }
 
@@ -74,11 +74,11 @@ impl Effect for PitchErrors {
         Signature::steady(Carrier::Input, Parity::Mixed)
     }
 
-    fn applies(&self, rig: &Rig) -> bool {
+    fn applies(&self, rig: &NominalRig) -> bool {
         teeth(rig) > 2
     }
 
-    fn width(&self, rig: &Rig, _shape: &Shape) -> usize {
+    fn width(&self, rig: &NominalRig, _shape: &Shape) -> usize {
         2 * (teeth(rig) - 1)
     }
 
@@ -91,7 +91,7 @@ impl Effect for PitchErrors {
             .into()
     }
 
-    fn refine(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> Option<Shape> {
+    fn refine(&self, rig: &NominalRig, shape: &Shape, beta: &[f64]) -> Option<Shape> {
         let mut refined = table(beta, teeth(rig));
         refined.push(reach(shape, teeth(rig)));
         Some(refined)
@@ -106,7 +106,7 @@ impl Effect for PitchErrors {
         (&["backlash_error", "bearing_clearance", "centre_distance_error"], 0.4)
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let teeth = teeth(rig);
         let side = usize::from(at.sense < 0.0);
         let waves = teeth - 1;
@@ -138,7 +138,7 @@ impl Effect for PitchErrors {
         }
     }
 
-    fn parameters(&self, rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, rig: &NominalRig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let teeth = teeth(rig);
         let mut ccw = table(&found.beta, teeth);
         let cw = ccw.split_off(teeth);
@@ -153,7 +153,7 @@ impl Effect for PitchErrors {
         &["ccw_mm", "cw_mm", "tip_reach"]
     }
 
-    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let teeth = teeth(rig);
         let mut beta = Vec::with_capacity(2 * (teeth - 1));
         for name in ["ccw_mm", "cw_mm"] {

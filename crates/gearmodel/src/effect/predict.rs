@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Effect, Estimate, OperatingPoint, RevolutionsByLoad, Rig, Shape};
+use super::{Effect, Estimate, NominalRig, OperatingPoint, RevolutionsByLoad, Shape};
 use crate::Direction;
 
 /// A found effect with its amplitudes.
@@ -50,7 +50,7 @@ impl Condition {
 
     /// The station at θ1; the revolutions so far were made under this load and in this sense.
     #[must_use]
-    pub fn operating_point(&self, rig: &Rig, theta1_rad: f64) -> OperatingPoint {
+    pub fn operating_point(&self, rig: &NominalRig, theta1_rad: f64) -> OperatingPoint {
         let sense = self.direction.sign();
         let mut revolutions_by_load = RevolutionsByLoad::default();
         revolutions_by_load.load_nm[0] = self.load_nm;
@@ -71,7 +71,7 @@ impl Condition {
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     /// Rig that they were linearised about; `None` where nothing was diagnosed.
-    pub rig: Option<Rig>,
+    pub rig: Option<NominalRig>,
     /// The effects of the verdict; of a group its most probable member.
     pub effects: Vec<FoundEffect>,
 }
@@ -93,7 +93,7 @@ impl Found {
 }
 
 impl FoundEffect {
-    fn te(&self, rig: &Rig, station: &OperatingPoint) -> (f64, f64) {
+    fn te(&self, rig: &NominalRig, station: &OperatingPoint) -> (f64, f64) {
         let mut row = vec![0.0; self.estimate.beta.len()];
         self.effect.row(rig, &self.shape, station, &mut row);
         let te: f64 = row.iter().zip(&self.estimate.beta).map(|(x, b)| x * b).sum();

@@ -7,8 +7,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature, Stated,
-    StatedEffect, StatedError, Words,
+    Carrier, Effect, Estimate, Given, Grain, MeasurementPlan, NominalRig, OperatingPoint, Parameter, Parity, Shape,
+    Signature, Stated, StatedEffect, StatedError, Words,
 };
 
 /// Profile deviation by mesh orders.
@@ -58,15 +58,15 @@ impl Effect for ProfileError {
         Signature::steady(Carrier::Mesh, Parity::Even)
     }
 
-    fn signature_of(&self, _rig: &Rig, shape: &Shape) -> Signature {
+    fn signature_of(&self, _rig: &NominalRig, shape: &Shape) -> Signature {
         if shape[..] == [ALIKE] { self.signature() } else { Signature { parity: Parity::Mixed, ..self.signature() } }
     }
 
-    fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
+    fn shapes(&self, _rig: &NominalRig, plan: &MeasurementPlan) -> Vec<Shape> {
         if plan.senses == [true, true] { vec![vec![ALIKE], vec![A_FLANK], vec![OWN_ZERO]] } else { vec![vec![ALIKE]] }
     }
 
-    fn width(&self, _rig: &Rig, shape: &Shape) -> usize {
+    fn width(&self, _rig: &NominalRig, shape: &Shape) -> usize {
         if shape[..] == [A_FLANK] { 4 * ORDERS } else { 2 * ORDERS }
     }
 
@@ -74,7 +74,7 @@ impl Effect for ProfileError {
         Grain::Fine
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let first = if shape[..] == [A_FLANK] && at.sense < 0.0 { 2 * ORDERS } else { 0 };
         // `pitches` counts from each flank's own tooth 0: the cw flank's passes half a pitch later.
         let from_ccw = if shape[..] == [OWN_ZERO] || at.sense > 0.0 { 0.0 } else { 0.5 };
@@ -85,7 +85,7 @@ impl Effect for ProfileError {
         }
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         (0..ORDERS)
             .flat_map(|h| {
                 let polar = found.polar(2 * h);
@@ -101,7 +101,7 @@ impl Effect for ProfileError {
         &STATED
     }
 
-    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let both = !STATED[2 * ORDERS..].iter().any(|name| given.has(name));
         let waves = if both { ORDERS } else { 2 * ORDERS };
         let mut beta = Vec::with_capacity(2 * waves);
@@ -113,7 +113,7 @@ impl Effect for ProfileError {
         Ok((vec![if both { ALIKE } else { A_FLANK }], beta))
     }
 
-    fn stated(&self, _rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+    fn stated(&self, _rig: &NominalRig, shape: &Shape, beta: &[f64]) -> StatedEffect {
         let mut stated = StatedEffect::new();
         let mut beta = beta.to_vec();
         if shape[..] == [OWN_ZERO] {

@@ -1,7 +1,9 @@
 //! A shaft is softer than documented: the load winds it up, TE = −dir·T·C for the output shaft, −dir·T·C i² for the input
 //! shaft, whose torque is T i and whose twist is seen through the ratio.
 
-use super::{Carrier, Effect, Estimate, Fold, OperatingPoint, Parameter, Parity, Rig, Shaft, Shape, Signature, Words};
+use super::{
+    Carrier, Effect, Estimate, Fold, NominalRig, OperatingPoint, Parameter, Parity, Shaft, Shape, Signature, Words,
+};
 
 /// Compliance of the input or output shaft beyond the documented one.
 pub(super) struct ShaftCompliance(pub(super) Shaft);
@@ -39,7 +41,7 @@ impl Effect for ShaftCompliance {
         Signature::steady(carrier, Parity::Odd).with_load(1.0)
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
@@ -47,12 +49,12 @@ impl Effect for ShaftCompliance {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let seen = if self.0 == Shaft::Input { at.ratio * at.ratio } else { 1.0 };
         row[0] = -at.sense * at.load_nm * seen;
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("c_rad_per_nm", found.beta[0], found.std(0), "rad/(N.m)")]
     }
 

@@ -2,8 +2,8 @@
 //! TE = −k Σ dir·max(0, T − t0)·revolutions. The shape is [t0].
 
 use super::{
-    Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    StatedError, Words,
+    Accumulates, Carrier, Effect, Estimate, Given, MeasurementPlan, NominalRig, OperatingPoint, Parameter, Parity,
+    Shape, Signature, StatedError, Words,
 };
 
 /// Slip of a clamp or coupling.
@@ -29,13 +29,13 @@ impl Effect for Slip {
         Signature::steady(Carrier::None, Parity::Odd).with_load(1.0).accumulating(Accumulates::PerRevolution)
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
     /// Thresholds from none to just under the largest load. Between two loads the trace is not linear in t0 only above
     /// the lower one.
-    fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
+    fn shapes(&self, _rig: &NominalRig, plan: &MeasurementPlan) -> Vec<Shape> {
         let largest = plan.loads_nm.last().copied().unwrap_or(0.0);
         if largest <= 0.0 {
             return Vec::new();
@@ -58,7 +58,7 @@ impl Effect for Slip {
         true
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let [threshold_nm] = shape[..] else { return };
         let revolutions_by_load = &at.revolutions_by_load;
         row[0] = -revolutions_by_load
@@ -69,7 +69,7 @@ impl Effect for Slip {
             .sum::<f64>();
     }
 
-    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![
             Parameter::number("k_rad_per_rev_nm", found.beta[0], found.std(0), "rad/(rev.N.m)"),
             Parameter::grid("t0_nm", shape[0], "N.m"),
@@ -80,7 +80,7 @@ impl Effect for Slip {
         &["k_rad_per_rev_nm", "t0_nm"]
     }
 
-    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         Ok((vec![given.number_in("t0_nm", 0.0, 1e9)?], vec![given.number("k_rad_per_rev_nm")?]))
     }
 }

@@ -2,8 +2,8 @@
 //! TE = −dir·Δa(t) tan(α ∓ μ)/r2. The shape is [τ].
 
 use super::{
-    Accumulates, Carrier, Effect, Estimate, Given, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    StatedError, Words,
+    Accumulates, Carrier, Effect, Estimate, Given, MeasurementPlan, NominalRig, OperatingPoint, Parameter, Parity,
+    Shape, Signature, StatedError, Words,
 };
 
 /// Thermal growth of the centre distance.
@@ -27,7 +27,7 @@ impl Effect for ThermalDrift {
     }
 
     /// Where μ = 0 everywhere the two flanks lean alike, and nothing is left in common to both senses.
-    fn signature_of(&self, rig: &Rig, _shape: &Shape) -> Signature {
+    fn signature_of(&self, rig: &NominalRig, _shape: &Shape) -> Signature {
         if rig.ratio_orders().is_empty() {
             Signature { parity: Parity::Odd, ..self.signature() }
         } else {
@@ -36,7 +36,7 @@ impl Effect for ThermalDrift {
     }
 
     /// From a twelfth of the campaign (faster than that it is a constant) to thrice its length (a straight line).
-    fn shapes(&self, _rig: &Rig, plan: &Plan) -> Vec<Shape> {
+    fn shapes(&self, _rig: &NominalRig, plan: &MeasurementPlan) -> Vec<Shape> {
         [0.08, 0.16, 0.3, 0.6, 1.2, 3.0].into_iter().map(|part| vec![part * plan.duration_s.max(1e-3)]).collect()
     }
 
@@ -48,12 +48,12 @@ impl Effect for ThermalDrift {
         true
     }
 
-    fn row(&self, _rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let [tau_s] = shape[..] else { return };
         row[0] = at.sense * at.pressure_rad.tan() / at.r2_mm * (-at.time_s / tau_s).exp_m1();
     }
 
-    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("da_mm", found.beta[0], found.std(0), "mm"), Parameter::grid("tau_s", shape[0], "s")]
     }
 
@@ -61,7 +61,7 @@ impl Effect for ThermalDrift {
         &["da_mm", "tau_s"]
     }
 
-    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         Ok((vec![given.number_in("tau_s", 1e-9, 1e12)?], vec![given.number("da_mm")?]))
     }
 }

@@ -1,6 +1,6 @@
 //! θ2 was read dt later than θ1, and by then has moved on: TE = dt·dθ2/dt = dt·i·dθ1/dt.
 
-use super::{Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{Carrier, Effect, Estimate, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature, Words};
 
 /// θ2 was read dt later than θ1, and by then has moved on.
 pub(super) struct TimeSkew;
@@ -22,15 +22,15 @@ impl Effect for TimeSkew {
         Signature::steady(Carrier::Input, Parity::Odd).with_speed(Some(1.0))
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
-    fn row(&self, _rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, _rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         row[0] = at.ratio * at.speed_rad_per_s;
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("dt_s", found.beta[0], found.std(0), "s")]
     }
 

@@ -4,8 +4,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, OperatingPoint, Parameter, Parity, Plan, Rig, Shape, Signature,
-    StatedError, Words,
+    Carrier, Effect, Estimate, Given, Grain, MeasurementPlan, NominalRig, OperatingPoint, Parameter, Parity, Shape,
+    Signature, StatedError, Words,
 };
 
 /// One damaged tooth flank.
@@ -31,7 +31,7 @@ impl Effect for ToothDamage {
         Signature::steady(Carrier::Input, Parity::OneFlank)
     }
 
-    fn signature_of(&self, rig: &Rig, shape: &Shape) -> Signature {
+    fn signature_of(&self, rig: &NominalRig, shape: &Shape) -> Signature {
         let [tooth, flank, width] = shape[..] else { return self.signature() };
         let half = if flank > 0.0 { 0.0 } else { 0.5 };
         let at =
@@ -39,7 +39,7 @@ impl Effect for ToothDamage {
         Signature { sector_deg: Some([at(tooth - width), at(tooth + width)]), ..self.signature() }
     }
 
-    fn shapes(&self, rig: &Rig, plan: &Plan) -> Vec<Shape> {
+    fn shapes(&self, rig: &NominalRig, plan: &MeasurementPlan) -> Vec<Shape> {
         let mut shapes = Vec::new();
         for (flank, seen) in [1.0, -1.0].into_iter().zip(plan.senses) {
             for tooth in (0..rig.pair().teeth().0).filter(|_| seen) {
@@ -64,7 +64,7 @@ impl Effect for ToothDamage {
         Grain::Fine
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let [tooth, flank, width] = shape[..] else { return };
         if flank * at.sense < 0.0 {
             return;
@@ -77,7 +77,7 @@ impl Effect for ToothDamage {
         }
     }
 
-    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let [tooth, flank, width] = shape[..] else { return Vec::new() };
         vec![
             Parameter::grid("tooth", tooth, ""),
@@ -91,7 +91,7 @@ impl Effect for ToothDamage {
         &["tooth", "depth_mm", "width", "flank"]
     }
 
-    fn amplitudes(&self, rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let last = f64::from(rig.pair().teeth().0) - 1.0;
         let flank = if given.word("flank", &["ccw", "cw"], false)? == 0 { 1.0 } else { -1.0 };
         let shape = vec![given.number_in("tooth", 0.0, last)?.round(), flank, given.number_in("width", 0.01, 2.0)?];

@@ -15,8 +15,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Carrier, Effect, Estimate, Given, Grain, MeshOrders, OperatingPoint, Parameter, Parity, Plan, Rig, Rows, Shape,
-    Signature, Stated, StatedEffect, StatedError, Words,
+    Carrier, Effect, Estimate, Given, Grain, MeasurementPlan, MeshOrders, NominalRig, OperatingPoint, Parameter,
+    Parity, Rows, Shape, Signature, Stated, StatedEffect, StatedError, Words,
 };
 
 /// What a shape says.
@@ -190,7 +190,7 @@ impl Effect for TorsionalResonance {
         Signature::steady(Carrier::Input, Parity::Even).with_speed(Some(2.0))
     }
 
-    fn signature_of(&self, _rig: &Rig, shape: &Shape) -> Signature {
+    fn signature_of(&self, _rig: &NominalRig, shape: &Shape) -> Signature {
         match Resonance::of(shape).map(|resonance| resonance.excitation) {
             // Phase and gain of what is excited from outside turn with the sense.
             Some(Excitation::Turn(_)) => Signature { parity: Parity::Mixed, ..self.signature() },
@@ -201,11 +201,11 @@ impl Effect for TorsionalResonance {
         }
     }
 
-    fn applies(&self, _rig: &Rig) -> bool {
+    fn applies(&self, _rig: &NominalRig) -> bool {
         true
     }
 
-    fn shapes(&self, rig: &Rig, plan: &Plan) -> Vec<Shape> {
+    fn shapes(&self, rig: &NominalRig, plan: &MeasurementPlan) -> Vec<Shape> {
         let (Some(low), Some(high)) = (plan.speeds_rad_per_s.first(), plan.speeds_rad_per_s.last()) else {
             return Vec::new();
         };
@@ -252,7 +252,7 @@ impl Effect for TorsionalResonance {
     }
 
     /// An encoder at the f whose amplitude is 1.
-    fn refine(&self, _rig: &Rig, shape: &Shape, beta: &[f64]) -> Option<Shape> {
+    fn refine(&self, _rig: &NominalRig, shape: &Shape, beta: &[f64]) -> Option<Shape> {
         let own = Resonance::of(shape).filter(|own| own.excitation == Excitation::Encoder)?;
         let [amplitude] = beta else { return None };
         let factor = 1.0 / amplitude.sqrt();
@@ -261,7 +261,7 @@ impl Effect for TorsionalResonance {
             .then(|| Resonance { f_hz: own.f_hz * factor, ..own }.shape())
     }
 
-    fn width(&self, _rig: &Rig, shape: &Shape) -> usize {
+    fn width(&self, _rig: &NominalRig, shape: &Shape) -> usize {
         match Resonance::of(shape).map(|resonance| resonance.excitation) {
             Some(Excitation::Encoder) => 1,
             _ => 2,
@@ -290,11 +290,11 @@ impl Effect for TorsionalResonance {
         }
     }
 
-    fn row(&self, rig: &Rig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, rig: &NominalRig, shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         self.rows(rig, shape)(at, row);
     }
 
-    fn rows<'a>(&'a self, rig: &'a Rig, shape: &'a Shape) -> Rows<'a> {
+    fn rows<'a>(&'a self, rig: &'a NominalRig, shape: &'a Shape) -> Rows<'a> {
         let Some(Resonance { excitation, f_hz, zeta }) = Resonance::of(shape) else { return Box::new(|_, _| ()) };
         let orders = rig.mesh_orders();
         // Amplitudes of the orders change with the speed only, which a run keeps.
@@ -323,7 +323,7 @@ impl Effect for TorsionalResonance {
         }
     }
 
-    fn parameters(&self, _rig: &Rig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         let Some(Resonance { excitation, f_hz, zeta }) = Resonance::of(shape) else { return Vec::new() };
         if excitation == Excitation::Encoder {
             // β = (f_shape/f)², so f = f_shape/√β and df = f dβ/(2β).
@@ -341,7 +341,7 @@ impl Effect for TorsionalResonance {
         &["f_hz", "zeta", "excitation_rad", "phase_rad", "excited_by", "response"]
     }
 
-    fn amplitudes(&self, _rig: &Rig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
+    fn amplitudes(&self, _rig: &NominalRig, given: &Given<'_>) -> Result<(Shape, Vec<f64>), StatedError> {
         let excited_by = EXCITED_BY[given.word("excited_by", &EXCITED_BY, true)?];
         let (f_hz, zeta) = (given.number_in("f_hz", 1e-6, 1e9)?, given.number_in("zeta", 1e-6, 10.0)?);
         let of = |excitation| Resonance { excitation, f_hz, zeta }.shape();
@@ -354,7 +354,7 @@ impl Effect for TorsionalResonance {
         Ok((of(excitation), given.polar("excitation_rad")?))
     }
 
-    fn stated(&self, rig: &Rig, shape: &Shape, beta: &[f64]) -> StatedEffect {
+    fn stated(&self, rig: &NominalRig, shape: &Shape, beta: &[f64]) -> StatedEffect {
         let mut stated = self.reported(rig, shape, beta);
         let Some(Resonance { excitation, .. }) = Resonance::of(shape) else { return stated };
         let by = match excitation {
@@ -377,7 +377,7 @@ fn frequencies(highest_hz: f64, ratio: f64) -> impl Iterator<Item = f64> {
 }
 
 /// Amplitudes of e^{jnθ1} in the lead of the encoder's disc, rad, at a speed in turns a second.
-fn encoder_lead(rig: &Rig, f_hz: f64, zeta: f64, hz: f64) -> Vec<[f64; 2]> {
+fn encoder_lead(rig: &NominalRig, f_hz: f64, zeta: f64, hz: f64) -> Vec<[f64; 2]> {
     let (omega0, omega) = (TAU * f_hz, TAU * hz);
     (1_u32..)
         .zip(rig.ratio_orders())

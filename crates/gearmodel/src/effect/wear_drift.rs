@@ -1,6 +1,8 @@
 //! Teeth wear, so that backlash grows with revolutions × load: dj = w Σ T·revolutions, TE = −dir·(dj/2) cos α/A.
 
-use super::{Accumulates, Carrier, Effect, Estimate, OperatingPoint, Parameter, Parity, Rig, Shape, Signature, Words};
+use super::{
+    Accumulates, Carrier, Effect, Estimate, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature, Words,
+};
 
 /// Teeth wear, so that backlash grows with revolutions × load.
 pub(super) struct WearDrift;
@@ -30,7 +32,7 @@ impl Effect for WearDrift {
         true
     }
 
-    fn row(&self, rig: &Rig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
+    fn row(&self, rig: &NominalRig, _shape: &Shape, at: &OperatingPoint, row: &mut [f64]) {
         let work_rev_nm: f64 = at
             .revolutions_by_load
             .load_nm
@@ -41,7 +43,7 @@ impl Effect for WearDrift {
         row[0] = -at.sense * 0.5 * rig.pair().pressure_angle_rad().cos() * work_rev_nm / at.arm_mm;
     }
 
-    fn parameters(&self, _rig: &Rig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
+    fn parameters(&self, _rig: &NominalRig, _shape: &Shape, found: &Estimate) -> Vec<Parameter> {
         vec![Parameter::number("dj_mm_per_rev_nm", found.beta[0], found.std(0), "mm/(rev.N.m)")]
     }
 

@@ -30,7 +30,7 @@ fn a_drive_without_teeth_has_no_effects_of_teeth() {
     let at = operating_point(&rig, 0.3, Direction::Ccw);
     assert!((row(&rig, "bearing_clearance", &[], &at)[0] + 1.0).abs() < 1e-15);
     assert!((row(&rig, "backlash_error", &[], &at)[0] + 0.5).abs() < 1e-15);
-    let stiff = Rig::new(rig.pair().clone(), Errors::default(), [None; 2], None);
+    let stiff = NominalRig::new(rig.pair().clone(), Errors::default(), [None; 2], None);
     assert_eq!(row(&stiff, "friction_windup", &[], &at), [-1.0]);
 }
 

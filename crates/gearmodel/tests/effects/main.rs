@@ -10,7 +10,9 @@ mod teeth;
 use std::f64::consts::TAU;
 
 use gearmodel::contact::ContactModel;
-use gearmodel::effect::{Estimate, LIBRARY, OperatingPoint, ParameterKind, Plan, Rig, Value, by_name};
+use gearmodel::effect::{
+    Estimate, LIBRARY, MeasurementPlan, NominalRig, OperatingPoint, ParameterKind, Value, by_name,
+};
 use gearmodel::increment::common_normal;
 use gearmodel::{CircularSpec, CurveSpec, Direction, EllipticalSpec, Errors, GearPair, NominalModel, ToothSpec};
 use nalgebra::DMatrix;
@@ -50,13 +52,13 @@ fn toothed() -> Vec<GearPair> {
     ]
 }
 
-fn rig(pair: &GearPair) -> Rig {
+fn rig(pair: &GearPair) -> NominalRig {
     NominalModel::new(pair.clone(), SOFT).unwrap().rig([Some(3600.0), Some(3600.0)], Some(7.2e6))
 }
 
-fn plan() -> Plan {
+fn plan() -> MeasurementPlan {
     let speeds_rad_per_s = [2.5, 5.0, 10.0].map(|rpm| rpm * TAU / 60.0).to_vec();
-    Plan {
+    MeasurementPlan {
         loads_nm: vec![0.5, 5.0, 10.0, 15.0],
         speeds_rad_per_s,
         senses: [true, true],
@@ -68,7 +70,7 @@ fn plan() -> Plan {
     }
 }
 
-fn operating_point(rig: &Rig, theta1_rad: f64, direction: Direction) -> OperatingPoint {
+fn operating_point(rig: &NominalRig, theta1_rad: f64, direction: Direction) -> OperatingPoint {
     let mut at = rig.operating_point(theta1_rad, rig.pair().theta2(theta1_rad), direction);
     at.load_nm = LOAD_NM;
     at.speed_rad_per_s = direction.sign() * RPM * TAU / 60.0;
@@ -76,7 +78,7 @@ fn operating_point(rig: &Rig, theta1_rad: f64, direction: Direction) -> Operatin
     at
 }
 
-fn row(rig: &Rig, name: &str, shape: &[f64], at: &OperatingPoint) -> Vec<f64> {
+fn row(rig: &NominalRig, name: &str, shape: &[f64], at: &OperatingPoint) -> Vec<f64> {
     let (effect, shape) = (by_name(name).unwrap(), shape.to_vec());
     let mut row = vec![0.0; effect.width(rig, &shape)];
     effect.row(rig, &shape, at, &mut row);
@@ -105,7 +107,7 @@ fn left(trace: &[f64], exact: &[f64]) -> f64 {
 
 /// A trace against an exact one, both a function of rig, angle and sense.
 fn compare(
-    rig: &Rig,
+    rig: &NominalRig,
     what: &str,
     tolerance: f64,
     trace: impl Fn(&OperatingPoint) -> f64,
@@ -415,7 +417,7 @@ fn discs_and_couplings_are_those_of_exact_geometry() {
 }
 
 /// Stations of a turn in both senses.
-fn turn(rig: &Rig) -> Vec<OperatingPoint> {
+fn turn(rig: &NominalRig) -> Vec<OperatingPoint> {
     (0..720).flat_map(|n| Direction::BOTH.map(|d| operating_point(rig, TAU * f64::from(n) / 720.0, d))).collect()
 }
 

@@ -5,7 +5,7 @@ use gearmodel::effect::{Accumulates, Parity};
 use super::*;
 
 /// Principal angles between two effects' columns with a free zero, deg, ascending.
-fn principal_deg(rig: &Rig, a: (&str, &[f64]), b: (&str, &[f64])) -> Vec<f64> {
+fn principal_deg(rig: &NominalRig, a: (&str, &[f64]), b: (&str, &[f64])) -> Vec<f64> {
     let basis = |(name, shape): (&str, &[f64])| {
         let rows: Vec<Vec<f64>> = turn(rig).iter().map(|at| row(rig, name, shape, at)).collect();
         let mut columns = DMatrix::from_fn(rows.len(), rows[0].len(), |n, m| rows[n][m]);
@@ -50,12 +50,12 @@ fn what_elliptic_gears_cannot_tell_apart_and_what_they_can() {
     assert!(principal_deg(&lobes, e1, e2)[1] > 3.0);
 }
 
-fn rig_of_lobes() -> Rig {
+fn rig_of_lobes() -> NominalRig {
     rig(&free((44, 44), &CurveSpec::Lobed { eccentricity: 0.2, lobes: (2, 2) }))
 }
 
 /// One shape of every effect that does not evolve, with amplitudes.
-fn sampled(rig: &Rig) -> Vec<(&'static str, Vec<f64>, Vec<f64>)> {
+fn sampled(rig: &NominalRig) -> Vec<(&'static str, Vec<f64>, Vec<f64>)> {
     let mut cases = Vec::new();
     for effect in LIBRARY.iter().filter(|e| e.applies(rig)) {
         let mut shapes = effect.shapes(rig, &plan());

@@ -22,7 +22,7 @@ const HALVINGS: usize = 8;
 
 /// A pair with its documented errors, and what was noted about the encoders.
 #[derive(Clone, Debug)]
-pub struct Rig {
+pub struct NominalRig {
     pair: GearPair,
     errors: Errors,
     /// Lines of the input and of the output encoder, where known.
@@ -47,7 +47,7 @@ pub struct MeshOrders {
     pub amplitudes: Vec<[f64; 2]>,
 }
 
-impl Rig {
+impl NominalRig {
     /// A rig of a pair with its documented errors; `lines` are those of the input and of the output encoder.
     #[must_use]
     pub fn new(pair: GearPair, errors: Errors, lines: [Option<f64>; 2], output_counts_per_rev: Option<f64>) -> Self {
