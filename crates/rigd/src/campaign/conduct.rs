@@ -13,9 +13,9 @@ use super::journal::{FinishedRun, Journal, Line};
 use super::schedule::Schedule;
 use crate::clock::Clock;
 use crate::profile::Profile;
-use crate::run::attend::Attendant;
 use crate::run::halt::Halt;
 use crate::run::job::{Kind, RunSpec};
+use crate::run::observer::RunObserver;
 use crate::run::recorder::Recorder;
 use crate::run::rig::Rig;
 use crate::run::session::{LogHead, writer_options};
@@ -32,7 +32,7 @@ struct Current {
     finished: Option<Box<FinishedRun>>,
 }
 
-/// The attendant of a campaign.
+/// Looks on at a campaign: a log for each run, and the journal.
 pub struct Conductor {
     directory: PathBuf,
     profile: Profile,
@@ -222,7 +222,7 @@ impl Conductor {
 }
 
 #[async_trait(?Send)]
-impl Attendant for Conductor {
+impl RunObserver for Conductor {
     async fn begins(&mut self, rig: &mut Rig, job_index: usize, _: &RunSpec) -> Result<(), Halt> {
         let Some(&run) = self.indices.get(job_index) else { return Ok(()) };
         let is_fresh = self.current.as_ref().is_some_and(|current| current.run == run && current.finished.is_none());

@@ -9,7 +9,7 @@ use tokio::task::LocalSet;
 
 use super::run::TimeScale;
 use super::simulator::Simulator;
-use super::{Exit, fail, print, stop};
+use super::{Exit, fail, print};
 use crate::campaign::CampaignError;
 use crate::campaign::conduct::{Conductor, log_name, put_aside};
 use crate::campaign::estimate::{Estimate, estimate, time};
@@ -23,6 +23,7 @@ use crate::run::attend::Policy;
 use crate::run::halt::Halt;
 use crate::run::job::Job;
 use crate::run::keys::Keys;
+use crate::run::registry::Running;
 use crate::run::session::{self, Links, LogHead, Outcome, Work};
 use crate::run::stop::StopRequests;
 use crate::simulated::{self, PlantSpec};
@@ -117,7 +118,7 @@ pub fn main(args: &Args) -> Exit {
     if let Err(exit) = clear_away(&directory, &journal) {
         return exit;
     }
-    let running = stop::Running::register();
+    let running = Running::register();
     let exit = execute(args, prepared, &directory, journal);
     drop(running);
     exit

@@ -25,7 +25,7 @@ mod serve;
 mod set_up;
 mod sim;
 mod simulator;
-pub mod stop;
+mod stop;
 mod verify;
 mod withhold;
 

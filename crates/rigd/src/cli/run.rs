@@ -7,7 +7,7 @@ use tokio::task::LocalSet;
 
 use super::directions::Directions;
 use super::simulator::Simulator;
-use super::{Exit, fail, print, stop};
+use super::{Exit, fail, print};
 use crate::clock::Clock;
 use crate::plot;
 use crate::profile::{Profile, SLOWEST_RPM};
@@ -15,6 +15,7 @@ use crate::quantity::{RATE, SPEED, TORQUE};
 use crate::run::Plan;
 use crate::run::attend::Policy;
 use crate::run::keys::Keys;
+use crate::run::registry::Running;
 use crate::run::rig::slip_power_w;
 use crate::run::session::{self, Links, Outcome, Setup};
 use crate::run::stop::StopRequests;
@@ -160,7 +161,7 @@ pub fn main(args: &Args) -> Exit {
     if !args.json {
         announce(args, &setup);
     }
-    let running = stop::Running::register();
+    let running = Running::register();
     let exit = execute(args, setup, spec);
     drop(running);
     exit

@@ -7,9 +7,10 @@ use serde_json::{Value, json};
 
 use super::on_rig::{OnRig, on_rig};
 use super::run::seconds;
-use super::{Exit, fail, print, stop};
+use super::{Exit, fail, print};
 use crate::profile::{Profile, SLOWEST_RPM};
 use crate::run::halt::Halt;
+use crate::run::registry::Running;
 use crate::run::rig::Rig;
 use crate::run::session::{self, LogHead, Outcome};
 use crate::run::set_up::RATE_HZ;
@@ -144,7 +145,7 @@ pub fn conduct(
         rate_hz: RATE_HZ,
         quiet: common.quiet || common.json,
     };
-    let running = stop::Running::register();
+    let running = Running::register();
     let outcome = on_rig(work, body);
     drop(running);
     match outcome {

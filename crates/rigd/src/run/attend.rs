@@ -2,16 +2,16 @@
 
 use std::time::Duration;
 
-use async_trait::async_trait;
 use riglog::proto::{Level, Phase};
 use tokio::time::{Instant, sleep};
 
 use super::halt::Halt;
-use super::job::{Job, RunSpec};
+use super::job::Job;
 use super::limits::{KEY_HEAT, KEY_TEMPERATURE};
+use super::observer::RunObserver;
+use super::panic::survive;
 use super::rig::Rig;
 use super::sequence;
-use super::session::survive;
 use super::supervisor::Event;
 
 /// A run that was begun so often without an end is given up.
@@ -19,33 +19,6 @@ const MOST_ATTEMPTS: u32 = 5;
 
 /// DeviceKind of the heat account that has to be free before a run that spent it goes on.
 const COOLED: f64 = 0.25;
-
-/// Looks on, run by run: a campaign opens a log for each and keeps its journal; a single run needs nothing.
-#[async_trait(?Send)]
-pub trait Attendant {
-    /// A run begins, from its first revolution.
-    async fn begins(&mut self, rig: &mut Rig, index: usize, run: &RunSpec) -> Result<(), Halt>;
-    /// A run is complete.
-    async fn ended(&mut self, rig: &mut Rig, index: usize, run: &RunSpec) -> Result<(), Halt>;
-    /// The rig was switched off in the middle of the job; `goes_on` where the policy has a remedy.
-    async fn interrupted(&mut self, rig: &mut Rig, halt: &Halt, goes_on: bool) -> Result<(), Halt>;
-}
-
-/// Needs nothing.
-pub struct Nobody;
-
-#[async_trait(?Send)]
-impl Attendant for Nobody {
-    async fn begins(&mut self, _: &mut Rig, _: usize, _: &RunSpec) -> Result<(), Halt> {
-        Ok(())
-    }
-    async fn ended(&mut self, _: &mut Rig, _: usize, _: &RunSpec) -> Result<(), Halt> {
-        Ok(())
-    }
-    async fn interrupted(&mut self, _: &mut Rig, _: &Halt, _: bool) -> Result<(), Halt> {
-        Ok(())
-    }
-}
 
 /// When a job goes on after it was interrupted.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -97,11 +70,11 @@ pub async fn attend(
     rig: &mut Rig,
     job: &mut Job,
     policy: Policy,
-    attendant: &mut dyn Attendant,
+    observer: &mut dyn RunObserver,
 ) -> (Option<Halt>, Vec<String>) {
     let mut troubles = Vec::new();
     loop {
-        let halt = survive(sequence::execute(rig, job, attendant)).await.err();
+        let halt = survive(sequence::execute(rig, job, observer)).await.err();
         let halt = match halt {
             Some(halt) => Some(recognise(rig, halt).await),
             None => None,
@@ -115,7 +88,7 @@ pub async fn attend(
         troubles.extend(rig.switch_off(halt.event()).await);
         let attempts = if matches!(halt, Halt::Paused) { 0 } else { job.begin_again() };
         let remedy = policy.remedy(&halt).filter(|_| !rig.stop.any());
-        if let Err(failure) = attendant.interrupted(rig, &halt, remedy.is_some()).await {
+        if let Err(failure) = observer.interrupted(rig, &halt, remedy.is_some()).await {
             return (Some(failure), troubles);
         }
         let Some(remedy) = remedy else { return (Some(halt), troubles) };

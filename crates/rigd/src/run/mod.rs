@@ -3,13 +3,17 @@
 pub mod acquire;
 pub mod attend;
 pub mod brake_sweep;
+pub mod dialer;
 pub mod halt;
 pub mod job;
 pub mod keys;
 pub mod limits;
+pub mod observer;
+pub mod panic;
 pub mod progress;
-pub mod reconnect;
+mod reconnect;
 pub mod recorder;
+pub mod registry;
 pub mod rig;
 pub mod sequence;
 pub mod session;

@@ -1,6 +1,5 @@
-//! Opens the three devices, and opens them again once they were lost.
+//! Opens devices again once they were lost.
 
-use std::rc::Rc;
 use std::time::Duration;
 
 use riglog::proto::{Level, Phase};
@@ -9,81 +8,10 @@ use tokio::time::{Instant, sleep};
 use super::halt::Halt;
 use super::rig::Rig;
 use crate::device::stand_in::StandIn;
-use crate::device::{self, Brake, BusError, Counter, DeviceError, DeviceKind, Servo};
-use crate::link::{Address, Link};
-use crate::profile::Profile;
+use crate::device::{BusError, DeviceError, DeviceKind};
 
 /// How often a lost device is called. With its own time-outs it is heard within 2 s of its return.
 const CALL_PERIOD: Duration = Duration::from_millis(250);
-
-/// Opens a device's line another time; `None` while it is out of reach. For emulators within this process.
-pub type Redial = Rc<dyn Fn(DeviceKind) -> Option<Link>>;
-
-/// Knows where the devices are.
-pub struct Dialer {
-    profile: Profile,
-    redial: Option<Redial>,
-}
-
-impl Dialer {
-    /// For the devices of a profile; by `redial` where they are emulated within this process.
-    #[must_use]
-    pub fn new(profile: Profile, redial: Option<Redial>) -> Self {
-        Self { profile, redial }
-    }
-
-    fn address(&self, part: DeviceKind) -> Address {
-        let Profile { servo, brake, counter, .. } = &self.profile;
-        let (port, baud, format) = match part {
-            DeviceKind::Servo => (&servo.port, servo.baud, &servo.format),
-            DeviceKind::Brake => (&brake.port, brake.baud, &brake.format),
-            DeviceKind::Counter => (&counter.port, counter.baud, &counter.format),
-        };
-        Address { device: part.name(), port: port.clone(), baud, format: format.clone() }
-    }
-
-    async fn link(&self, link: Option<Link>, address: &Address, part: DeviceKind) -> Result<Link, Halt> {
-        match (link, &self.redial) {
-            (Some(link), _) => Ok(link),
-            (None, Some(redial)) => redial(part).ok_or_else(|| {
-                let (device, port) = (address.device, address.port.clone());
-                let reason = "the emulated device is unplugged".into();
-                Halt::Device(DeviceError::Bus(BusError::HungUp { device, port, reason }))
-            }),
-            (None, None) => Ok(address.open().await?),
-        }
-    }
-
-    /// The servo, on `link` where there is one already.
-    ///
-    /// # Errors
-    /// [`Halt::Driver`], [`Halt::Link`].
-    pub async fn servo(&self, link: Option<Link>) -> Result<Box<dyn Servo>, Halt> {
-        let driver = device::find(device::SERVOS, "servo", &self.profile.servo.driver)?;
-        let address = self.address(DeviceKind::Servo);
-        Ok(driver(self.link(link, &address, DeviceKind::Servo).await?, address, &self.profile.servo))
-    }
-
-    /// The brake's driver.
-    ///
-    /// # Errors
-    /// As [`Dialer::servo`].
-    pub async fn brake(&self, link: Option<Link>) -> Result<Box<dyn Brake>, Halt> {
-        let driver = device::find(device::BRAKES, "brake", &self.profile.brake.driver)?;
-        let address = self.address(DeviceKind::Brake);
-        Ok(driver(self.link(link, &address, DeviceKind::Brake).await?, address, &self.profile.brake))
-    }
-
-    /// The reader of the encoders.
-    ///
-    /// # Errors
-    /// As [`Dialer::servo`].
-    pub async fn counter(&self, link: Option<Link>) -> Result<Box<dyn Counter>, Halt> {
-        let driver = device::find(device::COUNTERS, "counter", &self.profile.counter.driver)?;
-        let address = self.address(DeviceKind::Counter);
-        Ok(driver(self.link(link, &address, DeviceKind::Counter).await?, address, &self.profile.counter))
-    }
-}
 
 impl Rig {
     /// Some device does not answer.

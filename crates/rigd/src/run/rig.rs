@@ -10,10 +10,10 @@ use tokio::task::JoinHandle;
 use tokio::time::{Instant, MissedTickBehavior};
 
 use super::acquire::Acquisition;
+use super::dialer::Dialer;
 use super::halt::{Halt, lost_part};
 use super::limits::{self, HeatAccount, Observed};
 use super::progress::Progress;
-use super::reconnect::Dialer;
 use super::stop::StopRequests;
 use super::supervisor::{Event, State};
 use crate::clock::Clock;

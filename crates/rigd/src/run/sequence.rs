@@ -7,9 +7,9 @@ use gearmodel::measure::RunConditions;
 use riglog::proto::Level;
 use riglog::proto::Phase;
 
-use super::attend::Attendant;
 use super::halt::Halt;
 use super::job::{Job, Kind, RunSpec, Settle};
+use super::observer::RunObserver;
 use super::rig::Rig;
 use super::settle::SettleMonitor;
 use super::supervisor::Event;
@@ -22,13 +22,13 @@ const BYTES_A_SAMPLE: f64 = 5.0;
 ///
 /// # Errors
 /// [`Halt`] says why the job was not finished; [`Halt::Paused`] when a pause is due.
-pub async fn execute(rig: &mut Rig, job: &mut Job, attendant: &mut dyn Attendant) -> Result<(), Halt> {
+pub async fn execute(rig: &mut Rig, job: &mut Job, observer: &mut dyn RunObserver) -> Result<(), Halt> {
     prepare(rig, job).await?;
     home(rig).await?;
     while let Some((index, run)) = job.current() {
         heed_pause(rig)?;
         if !job.is_partial() {
-            attendant.begins(rig, index, &run).await?;
+            observer.begins(rig, index, &run).await?;
         }
         approach(rig, &run, job.settle).await?;
         heed_pause(rig)?;
@@ -41,7 +41,7 @@ pub async fn execute(rig: &mut Rig, job: &mut Job, attendant: &mut dyn Attendant
         };
         if complete {
             job.advance();
-            attendant.ended(rig, index, &run).await?;
+            observer.ended(rig, index, &run).await?;
         }
     }
     Ok(())

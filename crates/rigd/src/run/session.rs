@@ -2,10 +2,8 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use std::task::Poll;
 
 use gearmodel::NominalModel;
 use nix::libc::SIGXFSZ;
@@ -15,11 +13,13 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use super::Plan;
 use super::acquire::Acquisition;
-use super::attend::{Attendant, Nobody, Policy, attend};
+use super::attend::{Policy, attend};
 use super::halt::Halt;
 use super::job::Job;
+use super::panic::survive;
+use super::dialer::{Dialer, Redial};
+use super::observer::{NoObserver, RunObserver};
 use super::progress::Progress;
-use super::reconnect::{Dialer, Redial};
 use super::recorder::{Entry, Recorder};
 use super::rig::{Devices, Rig};
 use super::stop::StopRequests;
@@ -117,7 +117,7 @@ pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -
         policy: setup.policy,
         quiet: setup.quiet,
     };
-    Ok(conduct(work, recorder, &mut Nobody, links, clock, stop).await)
+    Ok(conduct(work, recorder, &mut NoObserver, links, clock, stop).await)
 }
 
 /// A job and the rig to do it on.
@@ -138,7 +138,7 @@ pub struct Work {
 pub async fn conduct(
     work: Work,
     recorder: Recorder,
-    attendant: &mut dyn Attendant,
+    observer: &mut dyn RunObserver,
     links: Links,
     clock: Clock,
     stop: StopRequests,
@@ -146,7 +146,7 @@ pub async fn conduct(
     let Work { profile, model, mut job, policy, quiet } = work;
     let progress = Progress::new(job.revolutions(), quiet);
     let frame = Frame { profile, model, recorder, progress, links, clock, stop };
-    with_rig(frame, async |rig| attend(rig, &mut job, policy, attendant).await).await
+    with_rig(frame, async |rig| attend(rig, &mut job, policy, observer).await).await
 }
 
 /// What a session on the rig needs, whatever is done in it.
@@ -238,20 +238,6 @@ pub async fn leave(mut rig: Rig, outcome: (Option<Halt>, Vec<String>)) -> (Optio
     // A stop that came while the rig was stopping by itself was a stop all the same.
     let halt = halt.or_else(|| rig.heed_stop().err());
     (halt, troubles)
-}
-
-/// Makes a panic of the sequence a reason to switch off in order, as any other.
-pub async fn survive(sequence: impl Future<Output = Result<(), Halt>>) -> Result<(), Halt> {
-    let mut sequence = std::pin::pin!(sequence);
-    std::future::poll_fn(|context| {
-        // The rig is only switched off afterwards, from whatever state it is in.
-        catch_unwind(AssertUnwindSafe(|| sequence.as_mut().poll(context))).unwrap_or_else(|panic| {
-            let what = panic.downcast_ref::<&str>().map(ToString::to_string);
-            let what = what.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
-            Poll::Ready(Err(Halt::Panic { what }))
-        })
-    })
-    .await
 }
 
 /// A log that reaches the process's file size limit (`ulimit -f`) shall be an error of the write and a stop in order; unhandled, the
@@ -352,21 +338,4 @@ pub fn free_path(directory: &Path, what: &str) -> PathBuf {
         .map(|n| directory.join(if n == 0 { format!("{stem}.mcap") } else { format!("{stem}_{n}.mcap") }))
         .find(|path| !path.exists())
         .unwrap_or_else(|| directory.join(format!("{stem}.mcap")))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[tokio::test]
-    async fn a_panic_is_a_halt_with_its_message() {
-        let outcome = survive(async {
-            tokio::task::yield_now().await;
-            panic!("no such {}", "thing")
-        })
-        .await;
-        assert!(matches!(outcome, Err(Halt::Panic { what }) if what == "no such thing"));
-        assert!(survive(async { Ok(()) }).await.is_ok());
-        assert!(matches!(survive(async { Err(Halt::Operator) }).await, Err(Halt::Operator)));
-    }
 }

@@ -10,7 +10,7 @@ use riglog::RunMetadata;
 use serde_json::json;
 
 use super::super::on_rig::{OnRig, on_rig};
-use super::super::{Exit, fail, stop};
+use super::super::{Exit, fail};
 use super::{Output, date};
 use crate::calibration::{BrakeCalibration, Calibration};
 use crate::profile::{Profile, SLOWEST_RPM};
@@ -19,6 +19,7 @@ use crate::run::Plan;
 use crate::run::brake_sweep::{self, SweepPlan, Swept};
 use crate::run::halt::Halt;
 use crate::run::limits::slip_power_w;
+use crate::run::registry::Running;
 use crate::run::rig::Rig;
 use crate::run::session::{self, LogHead, Outcome};
 use riglog::pair;
@@ -99,7 +100,7 @@ pub fn main(args: &Args) -> Exit {
     };
     let rig = setup.profile.clone();
     let mean_ratio = setup.model.pair.closure();
-    let running = stop::Running::register();
+    let running = Running::register();
     let swept = Rc::new(RefCell::new(Swept::default()));
     let outcome = execute(args, setup, &plan, &swept);
     drop(running);
