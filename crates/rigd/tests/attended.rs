@@ -13,10 +13,11 @@ use rigd::analysis::Analysis;
 use rigd::device::bus::BusStatistics;
 use rigd::device::{DeviceError, DeviceKind, Identity, Servo, ServoStatus};
 use rigd::run::acquire::Acquisition;
-use rigd::run::attend::{Nobody, Policy, Suspend, attend};
+use rigd::run::attend::{Policy, Suspend, attend};
+use rigd::run::dialer::Dialer;
 use rigd::run::halt::Halt;
+use rigd::run::observer::NoObserver;
 use rigd::run::progress::Progress;
-use rigd::run::reconnect::Dialer;
 use rigd::run::rig::Rig;
 use rigd::run::session;
 use rigd::run::supervisor::State;
@@ -389,7 +390,7 @@ fn with_defect(defect: Defect, seed: u64) -> (Option<Halt>, Vec<String>, f64) {
             let bench = bench.clone();
             tokio::task::spawn_local(async move { bench.at_speed(0.0).await })
         };
-        let (halt, troubles) = attend(&mut rig, &mut bench.job(20.0), Policy::default(), &mut Nobody).await;
+        let (halt, troubles) = attend(&mut rig, &mut bench.job(20.0), Policy::default(), &mut NoObserver).await;
         turned.await.expect("it turned");
         assert_eq!(rig.state(), State::Off);
         let speed_rpm = bench.speed_rpm();

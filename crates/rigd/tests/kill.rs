@@ -8,7 +8,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use rand::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
-use rigd::device::COUNTERS;
+use rigd::device::drivers::COUNTERS;
 use rigd::link::Address;
 use rigd::profile::Profile;
 use riglog::proto::Phase;

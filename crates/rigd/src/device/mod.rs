@@ -1,7 +1,8 @@
-//! Devices by what they do. One device is one file and one line in its list.
+//! Devices by what they do. One device is one file and one line in its list, [`drivers`].
 
 pub mod bus;
 pub mod counter_box;
+pub mod drivers;
 pub mod dsp7000;
 pub mod map;
 pub mod mapped_brake;
@@ -18,8 +19,6 @@ use async_trait::async_trait;
 use thiserror::Error;
 use wire::counter_box::Samples;
 
-use crate::link::{Address, Link};
-use crate::profile::{BrakeProfile, CounterProfile, ServoProfile};
 pub use bus::BusError;
 pub use wire::DeviceKind;
 
@@ -265,43 +264,4 @@ pub trait Counter {
     fn clocks(&self) -> Option<Clocks> {
         None
     }
-}
-
-/// Drivers by their name in the profile: each is opened on its link.
-type Drivers<P, D> = &'static [(&'static str, fn(Link, Address, &P) -> Box<D>)];
-
-/// Driver's name of a device whose register map is a file of its own, named by `map`.
-pub const MAP: &str = "map";
-
-/// Servo drives by their name in the profile.
-pub const SERVOS: Drivers<ServoProfile, dyn Servo> =
-    &[("asda-b2", mapped_servo::open), ("dsy-rs", mapped_servo::open), (MAP, mapped_servo::open)];
-
-/// Brake drivers by their name in the profile.
-pub const BRAKES: Drivers<BrakeProfile, dyn Brake> =
-    &[("rd60xx", mapped_brake::open), ("dsp7000", dsp7000::open), (MAP, mapped_brake::open)];
-
-/// Encoder readers by their name in the profile.
-pub const COUNTERS: Drivers<CounterProfile, dyn Counter> =
-    &[("counter-box", counter_box::open), (qsb::DRIVER, qsb::open)];
-
-/// A driver's name that is in no list.
-#[derive(Debug, Error)]
-#[error("{device}: no driver '{name}'; this version has {known}")]
-pub struct UnknownDriver {
-    device: &'static str,
-    name: String,
-    known: String,
-}
-
-/// Finds a driver by its name in the profile.
-///
-/// # Errors
-/// [`UnknownDriver`] lists those that there are.
-pub fn find<F: Copy>(drivers: &[(&'static str, F)], device: &'static str, name: &str) -> Result<F, UnknownDriver> {
-    drivers.iter().find(|(known, _)| *known == name).map(|(_, factory)| *factory).ok_or_else(|| UnknownDriver {
-        device,
-        name: name.to_owned(),
-        known: drivers.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", "),
-    })
 }

@@ -15,9 +15,8 @@ use super::qsb_reader::{Jumped, Reader, TICK_NS, TICK_S};
 use super::two_clocks::{ClockFit, Skew};
 use super::{Clocks, Counter, CounterIdentity, DeviceError, Zero};
 use crate::link::{Address, Link};
-use crate::profile::CounterProfile;
 pub use crate::profile::qsb::DRIVER;
-use crate::profile::qsb::QsbProfile;
+use crate::profile::{CounterProfile, QsbProfile};
 
 /// How long a reader may take to answer.
 const PATIENCE: Duration = Duration::from_millis(300);

@@ -10,8 +10,9 @@ use std::time::Duration;
 use serde::Serialize;
 use tokio::time::{Instant, timeout};
 
+use crate::device::bus::BusStatistics;
 use crate::device::refused::{TE_ASKED_RAD, check_resolution};
-use crate::device::{self, Brake, Counter, DeviceError, Servo, Zero};
+use crate::device::{Brake, BrakeStatus, Counter, DeviceError, Servo, Zero, drivers};
 use crate::link::{Address, Link};
 use crate::profile::Profile;
 use crate::run::session::Links;
@@ -101,21 +102,21 @@ pub async fn examine(profile: &Profile, links: Links, consent: Consent, stop: &S
     let [at_servo, at_brake, at_counter] = addresses;
     let mut servo = match (
         connect(&mut report, links.servo, &at_servo).await,
-        device::find(device::SERVOS, "servo", &servo.driver),
+        drivers::find(drivers::SERVOS, "servo", &servo.driver),
     ) {
         (Some(link), Ok(open)) => Some(open(link, at_servo, servo)),
         _ => None,
     };
     let mut brake = match (
         connect(&mut report, links.brake, &at_brake).await,
-        device::find(device::BRAKES, "brake", &brake.driver),
+        drivers::find(drivers::BRAKES, "brake", &brake.driver),
     ) {
         (Some(link), Ok(open)) => Some(open(link, at_brake, brake)),
         _ => None,
     };
     let mut counter = match (
         connect(&mut report, links.counter, &at_counter).await,
-        device::find(device::COUNTERS, "counter", &counter.driver),
+        drivers::find(drivers::COUNTERS, "counter", &counter.driver),
     ) {
         (Some(link), Ok(open)) => Some(open(link, at_counter, counter)),
         _ => None,
@@ -272,7 +273,7 @@ async fn examine_brake(report: &mut Report, brake: &mut dyn Brake, profile: &Pro
     }
     let begun = Instant::now();
     let mut slowest = Duration::ZERO;
-    let mut last = device::BrakeStatus::default();
+    let mut last = BrakeStatus::default();
     for _ in 0..REQUESTS / 4 {
         let asked = Instant::now();
         match brake.status().await {
@@ -329,7 +330,7 @@ fn latency(
     total: Duration,
     slowest: Duration,
     profile: &Profile,
-    line: &device::bus::BusStatistics,
+    line: &BusStatistics,
 ) {
     let mean_ms = total.as_secs_f64() * 1e3 / f64::from(REQUESTS);
     let slowest_ms = slowest.as_secs_f64() * 1e3;

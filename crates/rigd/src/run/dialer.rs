@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use super::halt::Halt;
-use crate::device::{self, Brake, BusError, Counter, DeviceError, DeviceKind, Servo};
+use crate::device::{Brake, BusError, Counter, DeviceError, DeviceKind, Servo, drivers};
 use crate::link::{Address, Link};
 use crate::profile::Profile;
 
@@ -50,7 +50,7 @@ impl Dialer {
     /// # Errors
     /// [`Halt::Driver`], [`Halt::Link`].
     pub async fn servo(&self, link: Option<Link>) -> Result<Box<dyn Servo>, Halt> {
-        let driver = device::find(device::SERVOS, "servo", &self.profile.servo.driver)?;
+        let driver = drivers::find(drivers::SERVOS, "servo", &self.profile.servo.driver)?;
         let address = self.address(DeviceKind::Servo);
         Ok(driver(self.link(link, &address, DeviceKind::Servo).await?, address, &self.profile.servo))
     }
@@ -60,7 +60,7 @@ impl Dialer {
     /// # Errors
     /// As [`Dialer::servo`].
     pub async fn brake(&self, link: Option<Link>) -> Result<Box<dyn Brake>, Halt> {
-        let driver = device::find(device::BRAKES, "brake", &self.profile.brake.driver)?;
+        let driver = drivers::find(drivers::BRAKES, "brake", &self.profile.brake.driver)?;
         let address = self.address(DeviceKind::Brake);
         Ok(driver(self.link(link, &address, DeviceKind::Brake).await?, address, &self.profile.brake))
     }
@@ -70,7 +70,7 @@ impl Dialer {
     /// # Errors
     /// As [`Dialer::servo`].
     pub async fn counter(&self, link: Option<Link>) -> Result<Box<dyn Counter>, Halt> {
-        let driver = device::find(device::COUNTERS, "counter", &self.profile.counter.driver)?;
+        let driver = drivers::find(drivers::COUNTERS, "counter", &self.profile.counter.driver)?;
         let address = self.address(DeviceKind::Counter);
         Ok(driver(self.link(link, &address, DeviceKind::Counter).await?, address, &self.profile.counter))
     }

@@ -3,7 +3,8 @@
 use thiserror::Error;
 
 use super::supervisor::{Event, State};
-use crate::device::{BusError, DeviceError, DeviceKind, UnknownDriver};
+use crate::device::drivers::UnknownDriver;
+use crate::device::{BusError, DeviceError, DeviceKind};
 use crate::link::LinkError;
 
 /// Why a run ends before its time.

@@ -14,11 +14,11 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use super::Plan;
 use super::acquire::Acquisition;
 use super::attend::{Policy, attend};
+use super::dialer::{Dialer, Redial};
 use super::halt::Halt;
 use super::job::Job;
-use super::panic::survive;
-use super::dialer::{Dialer, Redial};
 use super::observer::{NoObserver, RunObserver};
+use super::panic::survive;
 use super::progress::Progress;
 use super::recorder::{Entry, Recorder};
 use super::rig::{Devices, Rig};
@@ -27,7 +27,7 @@ use super::supervisor::Event;
 use crate::analysis::Analysis;
 use crate::clock::Clock;
 use crate::device::bus::BusStatistics;
-use crate::device::{self, UnknownDriver};
+use crate::device::drivers::{self, UnknownDriver};
 use crate::link::Link;
 use crate::profile::Profile;
 
@@ -315,9 +315,9 @@ pub async fn connect(dialer: &Dialer, links: Links) -> Result<Devices, Halt> {
 /// # Errors
 /// [`UnknownDriver`] lists those that there are.
 pub fn check_drivers(profile: &Profile) -> Result<(), UnknownDriver> {
-    device::find(device::SERVOS, "servo", &profile.servo.driver)?;
-    device::find(device::BRAKES, "brake", &profile.brake.driver)?;
-    device::find(device::COUNTERS, "counter", &profile.counter.driver)?;
+    drivers::find(drivers::SERVOS, "servo", &profile.servo.driver)?;
+    drivers::find(drivers::BRAKES, "brake", &profile.brake.driver)?;
+    drivers::find(drivers::COUNTERS, "counter", &profile.counter.driver)?;
     Ok(())
 }
 

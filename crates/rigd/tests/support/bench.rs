@@ -9,8 +9,9 @@ use gearmodel::Direction;
 use rigd::analysis::Analysis;
 use rigd::clock::Clock;
 use rigd::profile::Profile;
-use rigd::run::attend::{Nobody, Policy};
+use rigd::run::attend::Policy;
 use rigd::run::job::{Job, Kind, RunSpec};
+use rigd::run::observer::NoObserver;
 use rigd::run::recorder::Recorder;
 use rigd::run::session::{self, LogHead, Outcome, Work};
 use rigd::run::stop::StopRequests;
@@ -87,7 +88,7 @@ impl Bench {
         let (_, model) = pair::load(None).expect("the built-in pair");
         let work = Work { profile: self.profile.clone(), model, job, policy, quiet: true };
         let links = simulated::links_to(&self.world);
-        session::conduct(work, self.recorder(), &mut Nobody, links, self.clock, self.stop.clone()).await
+        session::conduct(work, self.recorder(), &mut NoObserver, links, self.clock, self.stop.clone()).await
     }
 
     /// Until the shafts turn under load at speed, and a while.

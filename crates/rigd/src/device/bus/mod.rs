@@ -16,9 +16,9 @@ mod error;
 mod memory;
 mod owner;
 mod statistics;
+mod timing;
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
 use tokio::sync::{mpsc, oneshot};
 use wire::register_map::{RegisterDef, RegisterError};
@@ -27,34 +27,9 @@ pub use error::BusError;
 pub use memory::Horizon;
 use owner::{Ask, Job, Owner, Range};
 pub use statistics::BusStatistics;
+pub use timing::{Manners, Span};
 
 use crate::link::{Address, Link};
-
-/// How a device wants its line used.
-#[derive(Debug, Clone, Copy)]
-pub struct Manners {
-    /// Silence before a request and after an answer.
-    pub silence: Duration,
-    /// Longest wait for an answer, beyond its time on the wire.
-    pub patience: Duration,
-    /// How often a request is sent before the device counts as lost.
-    pub attempts: u32,
-}
-
-/// Consecutive registers that may all be read, whatever is in them: room for reads of different lengths.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Span {
-    /// First register.
-    pub first: u16,
-    /// How many.
-    pub words: u16,
-}
-
-impl Span {
-    fn end(self) -> u32 {
-        u32::from(self.first) + u32::from(self.words)
-    }
-}
 
 /// Transactions that may wait for the line; a driver asks one after another.
 const QUEUE: usize = 4;

@@ -11,8 +11,11 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, timeout_at};
 use wire::modbus::{self, ClientDecoder, Request, Response};
 
+use super::error::BusError;
+use super::memory::Horizon;
 use super::memory::{Memory, Shape};
-use super::{BusError, BusStatistics, Horizon, Manners, Span};
+use super::statistics::BusStatistics;
+use super::timing::{Manners, Span};
 use crate::link::{Address, Link};
 
 /// Longest wait for a line to fall silent: shorter than any lease, so that one chattering device never costs the other's.
