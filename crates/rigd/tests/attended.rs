@@ -271,8 +271,9 @@ fn a_drive_without_a_watchdog_is_refused_unless_that_is_accepted() {
 fn a_servo_lost_for_good_is_held_by_the_brake_until_its_heat_is_spent() {
     in_virtual_time(async {
         let mut bench = Bench::new(11);
-        // 10 N·m at 30 rpm are 31.4 W: of 25 W continuous the account of 1500 J is full after four minutes.
-        bench.profile.limits.slip_power_w = 25.0;
+        // 10 N·m at 30 rpm are 31.4 W of 32 W; a source that puts out a fifth more makes 41 W of it, and the account of 1920 J is full
+        // after some four minutes.
+        bench.profile.limits.slip_power_w = 32.0;
         bench.world.borrow_mut().take_watchdog_away();
         let mut job = bench.job(1000.0);
         job.accept_no_watchdog = true;
@@ -280,6 +281,7 @@ fn a_servo_lost_for_good_is_held_by_the_brake_until_its_heat_is_spent() {
             let bench = bench.clone();
             tokio::task::spawn_local(async move {
                 bench.at_speed(2.0).await;
+                bench.world.borrow_mut().run_brake_away(1.2);
                 bench.world.borrow_mut().unplug(DeviceKind::Servo);
                 let unplugged = Instant::now();
                 // Without a watchdog the motor drives on: the load must stay on it.

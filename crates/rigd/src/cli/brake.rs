@@ -5,10 +5,10 @@ use std::cell::Cell;
 use riglog::RunMetadata;
 use serde_json::json;
 
-use super::set_up::{self, Common, Refusal, Task};
+use super::set_up::{self, Common, Task};
 use super::{Exit, fail};
-use crate::profile::Profile;
 use crate::quantity::TORQUE;
+use crate::run::admission::{Terms, admit_load};
 use crate::run::rig::Rig;
 use crate::run::session;
 use crate::run::set_up::hold_brake;
@@ -29,7 +29,7 @@ pub fn main(args: &Args) -> Exit {
         Ok(profile) => profile,
         Err(error) => return fail(Exit::BadInput, error.as_ref()),
     };
-    if let Err(refusal) = refuse(args.load, &profile) {
+    if let Err(refusal) = admit_load(&profile, Terms::SET_POINTS, args.load) {
         return fail(Exit::BadInput, &refusal);
     }
     let drag_nm = profile.brake.drag_nm();
@@ -51,20 +51,4 @@ pub fn main(args: &Args) -> Exit {
         heat_j.set(rig.heat.heat_j());
         outcome
     })
-}
-
-fn refuse(load_nm: f64, profile: &Profile) -> Result<(), Refusal> {
-    let limit = profile.limits.load_nm;
-    if load_nm > limit {
-        return Err(Refusal::OverLimit {
-            what: "load",
-            value: load_nm,
-            limit,
-            unit: "N·m",
-            key: "limits.load_nm",
-            advice: ", or raise the limit if the rig allows it",
-        });
-    }
-    let limit_a = profile.brake.current_limit_a;
-    if profile.brake.current_a(load_nm).is_none() { Err(Refusal::BeyondBrake { load_nm, limit_a }) } else { Ok(()) }
 }

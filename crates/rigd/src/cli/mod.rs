@@ -7,7 +7,6 @@ mod brake;
 mod calibrate;
 mod campaign;
 mod diagnose;
-mod directions;
 mod doctor;
 mod export;
 mod import;

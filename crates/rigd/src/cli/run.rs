@@ -5,18 +5,18 @@ use std::path::{Path, PathBuf};
 use riglog::LogError;
 use tokio::task::LocalSet;
 
-use super::directions::Directions;
 use super::simulator::Simulator;
 use super::{Exit, fail, print};
 use crate::clock::Clock;
 use crate::plot;
-use crate::profile::{Profile, SLOWEST_RPM};
+use crate::profile::Profile;
 use crate::quantity::{RATE, SPEED, TORQUE};
 use crate::run::Plan;
+use crate::run::admission::{Terms, admit};
 use crate::run::attend::Policy;
 use crate::run::keys::Keys;
 use crate::run::registry::Running;
-use crate::run::rig::slip_power_w;
+use crate::run::senses::Senses;
 use crate::run::session::{self, Links, Outcome, Setup};
 use crate::run::stop::StopRequests;
 use crate::simulated::{self, PlantSpec};
@@ -37,7 +37,7 @@ pub struct Args {
     rpm: f64,
     /// Senses of rotation, in this order
     #[arg(long, value_enum, default_value = "both")]
-    direction: Directions,
+    direction: Senses,
     /// Whole revolutions of the driver to record in each sense
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     revs: u32,
@@ -115,20 +115,6 @@ pub enum TimeScale {
 /// What is refused before anything is opened, moved or written.
 #[derive(Debug, thiserror::Error)]
 enum Refusal {
-    #[error(
-        "{option} {value} {unit} is over the limit {limit} {unit} ({key} in profile '{profile}'); lower it, or raise the limit if the rig allows it"
-    )]
-    OverLimit { option: &'static str, value: f64, unit: &'static str, limit: f64, key: &'static str, profile: String },
-    #[error(
-        "--load {load_nm} N·m is beyond the brake's calibrated curve or its current limit {limit_a} A (brake.rising, brake.current_limit_a in profile '{profile}'); lower the load, or calibrate further"
-    )]
-    BeyondBrake { load_nm: f64, limit_a: f64, profile: String },
-    #[error(
-        "--load {load_nm} N·m at --rpm {speed_rpm} makes {power_w:.0} W of heat in the brake, over its {limit_w} W (limits.slip_power_w in profile '{profile}'); lower load or speed"
-    )]
-    TooHot { load_nm: f64, speed_rpm: f64, power_w: f64, limit_w: f64, profile: String },
-    #[error("--rpm {speed_rpm} is too slow: a revolution would take hours; use {SLOWEST_RPM} rpm or more")]
-    TooSlow { speed_rpm: f64 },
     #[error("--rate {rate_hz} Hz does not fit the clock of a counter: use 10 Hz to 1 MHz")]
     Rate { rate_hz: f64 },
     #[error("--undocumented '{name}' is not an effect of the simulated rig; it has: {known}")]
@@ -241,41 +227,12 @@ fn same_gears(args: &Args, plant_toml: &str, model_toml: &str) -> Result<(), Ref
     }
 }
 
-fn refuse(profile: &Profile, plan: &Plan) -> Result<(), Refusal> {
-    let (limits, name) = (&profile.limits, &profile.name);
-    let over = |option, value: f64, unit, limit: f64, key| {
-        if value <= limit {
-            Ok(())
-        } else {
-            Err(Refusal::OverLimit { option, value, unit, limit, key, profile: name.clone() })
-        }
-    };
-    over("--rpm", plan.speed_rpm, "rpm", limits.speed_rpm, "limits.speed_rpm")?;
-    if plan.speed_rpm < SLOWEST_RPM {
-        return Err(Refusal::TooSlow { speed_rpm: plan.speed_rpm });
-    }
+fn refuse(profile: &Profile, plan: &Plan) -> Result<(), Box<dyn std::error::Error>> {
     for &load_nm in &plan.loads_nm {
-        over("--load", load_nm, "N·m", limits.load_nm, "limits.load_nm")?;
-        if profile.brake.current_a(load_nm).is_none() {
-            return Err(Refusal::BeyondBrake {
-                load_nm,
-                limit_a: profile.brake.current_limit_a,
-                profile: name.clone(),
-            });
-        }
-        let power_w = slip_power_w(load_nm, plan.speed_rpm);
-        if power_w > limits.slip_power_w {
-            return Err(Refusal::TooHot {
-                load_nm,
-                speed_rpm: plan.speed_rpm,
-                power_w,
-                limit_w: limits.slip_power_w,
-                profile: name.clone(),
-            });
-        }
+        admit(profile, Terms::OPTIONS, load_nm, plan.speed_rpm)?;
     }
     if !(10.0..=1e6).contains(&plan.rate_hz) {
-        return Err(Refusal::Rate { rate_hz: plan.rate_hz });
+        return Err(Box::new(Refusal::Rate { rate_hz: plan.rate_hz }));
     }
     Ok(())
 }

@@ -8,12 +8,12 @@ use serde_json::{Value, json};
 use super::on_rig::{OnRig, on_rig};
 use super::run::seconds;
 use super::{Exit, fail, print};
-use crate::profile::{Profile, SLOWEST_RPM};
+use crate::profile::Profile;
 use crate::run::halt::Halt;
 use crate::run::registry::Running;
 use crate::run::rig::Rig;
 use crate::run::session::{self, LogHead, Outcome};
-use crate::run::set_up::RATE_HZ;
+use crate::run::set_up::{LARGEST_RPM, RATE_HZ};
 use riglog::pair;
 
 /// Options of both.
@@ -48,37 +48,11 @@ pub enum Refusal {
     /// The shaft turns only with consent.
     #[error("the shaft turns only with consent: clear the rig, keep hands off it, and say --turn")]
     NoConsent,
-    /// Nothing would be seen to turn.
-    #[error("--rpm {speed_rpm} is too slow; use {SLOWEST_RPM} rpm or more")]
-    TooSlow {
-        /// What was asked for, rpm.
+    /// Faster than is safe beside open teeth.
+    #[error("--rpm {speed_rpm} rpm is over the limit {LARGEST_RPM} rpm (of set-up); lower it, or use rigd run")]
+    TooFast {
+        /// What was asked for, rpm of the driver.
         speed_rpm: f64,
-    },
-    /// A value over its limit.
-    #[error("{what} {value} {unit} is over the limit {limit} {unit} ({key}); lower it{advice}")]
-    OverLimit {
-        /// Which value.
-        what: &'static str,
-        /// How much was asked for.
-        value: f64,
-        /// The limit.
-        limit: f64,
-        /// Unit of both.
-        unit: &'static str,
-        /// Where the limit comes from.
-        key: &'static str,
-        /// What else may be done.
-        advice: &'static str,
-    },
-    /// The curve ends before it.
-    #[error(
-        "{load_nm} N·m is beyond the brake's calibrated curve or its current limit {limit_a} A (brake.rising, brake.current_limit_a); lower it, or calibrate further"
-    )]
-    BeyondBrake {
-        /// What was asked for, N·m.
-        load_nm: f64,
-        /// The coil's limit, A.
-        limit_a: f64,
     },
 }
 

@@ -9,6 +9,7 @@ use gearmodel::calibration::{Sweep, TorqueReading};
 use riglog::proto::{Level, Phase};
 
 use super::Plan;
+use super::admission::{Terms, admit_heat};
 use super::halt::Halt;
 use super::job::Job;
 use super::rig::Rig;
@@ -59,6 +60,8 @@ pub async fn execute(rig: &mut Rig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>
         rate_hz: plan.rate_hz,
         accept_no_watchdog: false,
     };
+    // The currents go up to what loads the gear to its limit.
+    admit_heat(&rig.profile, Terms::SET_POINTS, rig.profile.limits.load_nm, plan.speed_rpm)?;
     sequence::prepare(rig, &Job::of(&turning)).await?;
     rig.enter(Phase::Approach);
     rig.set_coil_current(0.0).await?;

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::admission::Refusal;
 use super::supervisor::{Event, State};
 use crate::device::drivers::UnknownDriver;
 use crate::device::{BusError, DeviceError, DeviceKind};
@@ -29,6 +30,9 @@ pub enum Halt {
         /// What to do next.
         advice: &'static str,
     },
+    /// The run was never within the profile's limits.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
     /// A device failed or is lost.
     #[error(transparent)]
     Device(#[from] DeviceError),

@@ -1,6 +1,7 @@
 //! One run of the rig, from connecting to the finalised log.
 
 pub mod acquire;
+pub mod admission;
 pub mod attend;
 pub mod brake_sweep;
 pub mod dialer;
@@ -15,6 +16,7 @@ mod reconnect;
 pub mod recorder;
 pub mod registry;
 pub mod rig;
+pub mod senses;
 pub mod sequence;
 pub mod session;
 pub mod set_up;

@@ -20,8 +20,6 @@ use crate::clock::Clock;
 use crate::device::{Brake, BrakeStatus, Counter, DeviceError, DeviceKind, Servo, ServoStatus};
 use crate::profile::Profile;
 
-pub use super::limits::slip_power_w;
-
 /// The three drivers.
 pub struct Devices {
     /// The servo drive.

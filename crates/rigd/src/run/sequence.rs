@@ -7,6 +7,7 @@ use gearmodel::measure::RunConditions;
 use riglog::proto::Level;
 use riglog::proto::Phase;
 
+use super::admission::admit_job;
 use super::halt::Halt;
 use super::job::{Job, Kind, RunSpec, Settle};
 use super::observer::RunObserver;
@@ -51,11 +52,14 @@ fn heed_pause(rig: &Rig) -> Result<(), Halt> {
     if rig.stop.paused() { Err(Halt::Paused) } else { Ok(()) }
 }
 
-/// Identifies the devices, starts the encoders, and arms the drive's watchdog before it is enabled.
+/// Admits the job, identifies the devices, starts the encoders, and arms the drive's watchdog before it is enabled: whatever turns the
+/// motor comes through here.
 ///
 /// # Errors
-/// [`Halt`], among them [`DeviceError::NoWatchdog`] for a drive that has none.
+/// [`Halt`], among them [`Halt::Refused`] for a run beyond the profile's limits, and [`DeviceError::NoWatchdog`] for a drive that
+/// has none.
 pub async fn prepare(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
+    admit_job(&rig.profile, job)?;
     meet(rig, job).await?;
     // Last, for the drive's watchdog runs from here on.
     arm_watchdog(rig, job.accept_no_watchdog).await?;

@@ -8,6 +8,7 @@ use riglog::proto::{Level, Phase};
 use tokio::time::Instant;
 
 use super::Plan;
+use super::admission::{Terms, admit_load};
 use super::halt::Halt;
 use super::job::Job;
 use super::rig::Rig;
@@ -89,6 +90,7 @@ pub async fn jog(rig: &mut Rig, jog: Jog, from_rad: &Cell<f64>) -> Result<(), Ha
 /// # Errors
 /// [`Halt`], among them [`Halt::Operator`], and [`Halt::Limit`] when somebody turns the gear for longer than the brake's heat allows.
 pub async fn hold_brake(rig: &mut Rig, load_nm: f64, seconds: f64) -> Result<(), Halt> {
+    admit_load(&rig.profile, Terms::SET_POINTS, load_nm)?;
     sequence::meet(rig, &Job::of(&idle_plan(vec![Direction::Ccw], load_nm, 0.0))).await?;
     sequence::await_samples(rig).await?;
     rig.enter(Phase::Approach);

@@ -13,12 +13,12 @@ use super::super::on_rig::{OnRig, on_rig};
 use super::super::{Exit, fail};
 use super::{Output, date};
 use crate::calibration::{BrakeCalibration, Calibration};
-use crate::profile::{Profile, SLOWEST_RPM};
+use crate::profile::Profile;
 use crate::quantity::{SPEED, TORQUE};
 use crate::run::Plan;
+use crate::run::admission::{Terms, admit_heat, admit_speed};
 use crate::run::brake_sweep::{self, SweepPlan, Swept};
 use crate::run::halt::Halt;
-use crate::run::limits::slip_power_w;
 use crate::run::registry::Running;
 use crate::run::rig::Rig;
 use crate::run::session::{self, LogHead, Outcome};
@@ -86,10 +86,6 @@ struct Setup {
 enum Refusal {
     #[error("{option} {value} {unit} must be {expected}")]
     Value { option: &'static str, value: f64, unit: &'static str, expected: String },
-    #[error(
-        "limits.load_nm {load_nm} N·m at --rpm {speed_rpm} makes {power_w:.0} W of heat in the brake, over its {limit_w} W (limits.slip_power_w); lower --rpm, or --max-current with a smaller limits.load_nm"
-    )]
-    TooHot { load_nm: f64, speed_rpm: f64, power_w: f64, limit_w: f64 },
 }
 
 /// Runs the command.
@@ -134,20 +130,15 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
         let expected = format!("over 0 and at most brake.current_limit_a = {}", profile.brake.current_limit_a);
         refuse("--max-current", max_a, "A", expected)?;
     }
-    if !(SLOWEST_RPM..=limits.speed_rpm).contains(&args.rpm) {
-        refuse("--rpm", args.rpm, "rpm", format!("from {SLOWEST_RPM} to limits.speed_rpm = {}", limits.speed_rpm))?;
-    }
+    let terms = Terms { load: "limits.load_nm", ..Terms::OPTIONS };
+    admit_speed(&profile, terms, args.rpm)?;
     if !(0.0..=50.0).contains(&args.torque_uncertainty) {
         refuse("--torque-uncertainty", args.torque_uncertainty, "%", "from 0 to 50".into())?;
     }
     if args.rated_torque <= 0.0 {
         refuse("--rated-torque", args.rated_torque, "N·m", "over 0".into())?;
     }
-    let power_w = slip_power_w(limits.load_nm, args.rpm);
-    if power_w > limits.slip_power_w {
-        let (load_nm, limit_w) = (limits.load_nm, limits.slip_power_w);
-        return Err(Box::new(Refusal::TooHot { load_nm, speed_rpm: args.rpm, power_w, limit_w }));
-    }
+    admit_heat(&profile, terms, limits.load_nm, args.rpm)?;
     std::fs::create_dir_all(&args.logs)?;
     let (pair_toml, model) = pair::load(None)?;
     let sweep = SweepPlan {
