@@ -6,9 +6,8 @@ use std::time::Duration;
 use async_trait::async_trait;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::time::{Instant, timeout_at};
-use wire::counter_box::{
-    AckStatus, Command, Encoder, Frame, MAX_SAMPLES_PER_FRAME, PROTOCOL_VERSION, Samples, StreamDecoder,
-};
+use wire::Samples;
+use wire::counter_box::{AckStatus, Command, Encoder, Frame, MAX_SAMPLES_PER_FRAME, PROTOCOL_VERSION, StreamDecoder};
 
 use super::{Counter, CounterIdentity, DeviceError, Zero};
 use crate::link::{Address, Link};

@@ -17,7 +17,7 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use thiserror::Error;
-use wire::counter_box::Samples;
+use wire::Samples;
 
 pub use bus::BusError;
 pub use wire::DeviceKind;
