@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use rigd::run::attend::Policy;
 use rigd::run::halt::Halt;
-use rigd::run::limits::{KEY_HEAT, KEY_TEMPERATURE};
+use rigd::run::limits::Limit;
 use support::bench::{Bench, in_virtual_time};
 use tokio::time::sleep;
 
@@ -37,7 +37,7 @@ fn disturbed(
 
 /// Stopped by the limit of this key, which the log names.
 fn assert_over(key: &str, (halt, bench): (Option<Halt>, Bench)) {
-    assert!(matches!(&halt, Some(Halt::Limit { key: found, .. }) if *found == key), "{key}: {halt:?}");
+    assert!(matches!(&halt, Some(Halt::Limit(exceeded)) if exceeded.limit.key() == key), "{key}: {halt:?}");
     bench.event("halt", key);
 }
 
@@ -66,7 +66,7 @@ fn brake_heat() {
         }
     };
     assert_within("70 s of it", disturbed(limit, 60.0, fault(70)));
-    assert_over(KEY_HEAT, disturbed(limit, 60.0, fault(100)));
+    assert_over(Limit::BrakeHeat.key(), disturbed(limit, 60.0, fault(100)));
 }
 
 #[test]
@@ -74,7 +74,7 @@ fn brake_temperature() {
     // The brake stands at 22 °C and warms by a degree or two; its limit is 80 °C.
     let fault = |by_c| async move |bench: Bench| bench.world.borrow_mut().heat_brake_by(by_c);
     assert_within("75 °C", disturbed(|_| {}, 4.0, fault(53.0)));
-    assert_over(KEY_TEMPERATURE, disturbed(|_| {}, 4.0, fault(60.0)));
+    assert_over(Limit::BrakeTemperature.key(), disturbed(|_| {}, 4.0, fault(60.0)));
 }
 
 #[test]

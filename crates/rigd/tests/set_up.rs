@@ -14,7 +14,7 @@ use rigd::doctor::{self, Consent, Grade};
 use rigd::profile::Profile;
 use rigd::run::dialer::Dialer;
 use rigd::run::halt::Halt;
-use rigd::run::limits::KEY_HEAT;
+use rigd::run::limits::{Exceeded, Limit};
 use rigd::run::progress::Progress;
 use rigd::run::rig::Rig;
 use rigd::run::session::{self, Frame};
@@ -273,6 +273,6 @@ fn the_heat_account_holds_where_somebody_turns_the_gear() {
     let (halt, _) = held_against_a_turning_gear(200.0);
     assert!(halt.is_none(), "{halt:?}");
     let (halt, torque_nm) = held_against_a_turning_gear(300.0);
-    assert!(matches!(halt, Some(Halt::Limit { key: KEY_HEAT, .. })), "{halt:?}");
+    assert!(matches!(halt, Some(Halt::Limit(Exceeded { limit: Limit::BrakeHeat, .. }))), "{halt:?}");
     assert!(torque_nm < 1.0, "and the brake is at zero: {torque_nm} N·m");
 }

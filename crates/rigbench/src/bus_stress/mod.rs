@@ -18,6 +18,7 @@ use wire::modbus::{Request, Response};
 pub use device::{Brake, Counting, Device, Servo, serve};
 
 use super::proxy::{End, FaultPlan, Proxy, Record};
+use rigd::device::DeviceKind;
 use rigd::device::bus::{Bus, BusError, BusStatistics, Horizon, Manners, Span};
 use rigd::link::{Address, Duplex, Link};
 
@@ -109,7 +110,7 @@ impl Timing {
     /// The project's own master on a link.
     #[must_use]
     pub fn master(&self, link: Link, work: &Workload) -> Bus {
-        let address = Address { device: "device", port: "trial".into(), baud: 115_200, format: "8N1".into() };
+        let address = Address { device: DeviceKind::Servo, port: "trial".into(), baud: 115_200, format: "8N1".into() };
         Bus::new(link, address, work.unit, self.manners).with_spans(work.spans).with_horizon(self.horizon)
     }
 }

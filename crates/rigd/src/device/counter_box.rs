@@ -9,7 +9,7 @@ use tokio::time::{Instant, timeout_at};
 use wire::Samples;
 use wire::counter_box::{AckStatus, Command, Encoder, Frame, MAX_SAMPLES_PER_FRAME, PROTOCOL_VERSION, StreamDecoder};
 
-use super::{Counter, CounterIdentity, DeviceError, Zero};
+use super::{Counter, CounterIdentity, DeviceError, DeviceKind, Zero};
 use crate::link::{Address, Link};
 use crate::profile::CounterProfile;
 
@@ -133,7 +133,7 @@ impl Counter for CounterBox {
             .await?;
         if identity.protocol_version != PROTOCOL_VERSION {
             return Err(DeviceError::Unexpected {
-                device: "counter",
+                device: DeviceKind::Counter,
                 port: self.port.clone(),
                 found: format!("protocol version {}", identity.protocol_version),
                 expected: format!("version {PROTOCOL_VERSION}"),

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::{Brake, Counter, Servo, counter_box, dsp7000, map, mapped_brake, mapped_servo, qsb};
+use super::{Brake, Counter, DeviceKind, Servo, counter_box, dsp7000, map, mapped_brake, mapped_servo, qsb};
 use crate::link::{Address, Link};
 use crate::profile::{BrakeProfile, CounterProfile, ServoProfile};
 
@@ -25,7 +25,7 @@ pub const COUNTERS: Drivers<CounterProfile, dyn Counter> =
 #[derive(Debug, Error)]
 #[error("{device}: no driver '{name}'; this version has {known}")]
 pub struct UnknownDriver {
-    device: &'static str,
+    device: DeviceKind,
     name: String,
     known: String,
 }
@@ -34,7 +34,7 @@ pub struct UnknownDriver {
 ///
 /// # Errors
 /// [`UnknownDriver`] lists those that there are.
-pub fn find<F: Copy>(drivers: &[(&'static str, F)], device: &'static str, name: &str) -> Result<F, UnknownDriver> {
+pub fn find<F: Copy>(drivers: &[(&'static str, F)], device: DeviceKind, name: &str) -> Result<F, UnknownDriver> {
     drivers.iter().find(|(known, _)| *known == name).map(|(_, factory)| *factory).ok_or_else(|| UnknownDriver {
         device,
         name: name.to_owned(),

@@ -38,7 +38,7 @@ impl MappedBrake {
         let Some(model) = found.cloned() else {
             let known: Vec<String> = models.iter().map(|model| format!("{} {:?}", model.name, model.ids)).collect();
             return Err(DeviceError::Unexpected {
-                device: "brake",
+                device: DeviceKind::Brake,
                 port: self.device.bus.port().to_owned(),
                 found: format!("model {id}, whose scales are unknown"),
                 expected: format!("one of {}", known.join(", ")),

@@ -110,7 +110,7 @@ impl Servo for MappedServo {
             let value = self.device.get(&test.register).await?;
             if !test.holds(value) {
                 return Err(DeviceError::Unexpected {
-                    device: "servo",
+                    device: DeviceKind::Servo,
                     port: self.port(),
                     found: format!("{} = {value}", test.register),
                     expected: test.advice,
@@ -146,7 +146,7 @@ impl Servo for MappedServo {
             }
             if tokio::time::Instant::now() > patience {
                 return Err(DeviceError::NotReached {
-                    device: "servo",
+                    device: DeviceKind::Servo,
                     port: self.port(),
                     state: if enabled { "servo on" } else { "servo off" },
                     seconds: self.rules.enable_s,

@@ -103,7 +103,7 @@ pub enum DeviceError {
     #[error("{device} on {port}: {found} where the profile says {expected}; check the port and the profile's driver")]
     Unexpected {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// What it says it is.
@@ -117,7 +117,7 @@ pub enum DeviceError {
     )]
     Range {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// Quantity.
@@ -133,7 +133,7 @@ pub enum DeviceError {
     #[error("{device} on {port} did not reach '{state}' within {seconds} s; last status: {status}")]
     NotReached {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// The state that was asked for.
@@ -147,7 +147,7 @@ pub enum DeviceError {
     #[error("{device}: {reason}; `rigd profile check` shows every fault")]
     Map {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// What is wrong with the map.
         reason: String,
     },
@@ -155,7 +155,7 @@ pub enum DeviceError {
     #[error("{device} on {port}: {what}")]
     Line {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// What happened, and what to check.

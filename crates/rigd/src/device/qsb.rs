@@ -13,7 +13,7 @@ use wire::qsb::{Answer, END_CR, END_LF, END_TIME, Instruction, Kind, register};
 
 use super::qsb_reader::{Jumped, Reader, TICK_NS, TICK_S};
 use super::two_clocks::{ClockFit, Skew};
-use super::{Clocks, Counter, CounterIdentity, DeviceError, Zero};
+use super::{Clocks, Counter, CounterIdentity, DeviceError, DeviceKind, Zero};
 use crate::link::{Address, Link};
 pub use crate::profile::qsb::DRIVER;
 use crate::profile::{CounterProfile, QsbProfile};
@@ -104,7 +104,7 @@ impl Qsb {
 
     fn profile(&self) -> Result<&QsbProfile, DeviceError> {
         self.profile.as_ref().ok_or_else(|| DeviceError::Line {
-            device: "counter",
+            device: DeviceKind::Counter,
             port: self.address.port.clone(),
             what: "the profile has no [counter.qsb]; `rigd profile check` says what belongs there".into(),
         })

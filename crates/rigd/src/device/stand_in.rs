@@ -36,7 +36,7 @@ impl StandIn {
     }
 
     fn refuse<T>(&self) -> Result<T, DeviceError> {
-        let device = self.part.name();
+        let device = self.part;
         Err(match &self.reason {
             Reason::Lost { port } => {
                 BusError::HungUp { device, port: port.clone(), reason: "not connected".into() }.into()

@@ -12,7 +12,7 @@ use tokio::time::{Instant, timeout};
 
 use crate::device::bus::BusStatistics;
 use crate::device::refused::{TE_ASKED_RAD, check_resolution};
-use crate::device::{Brake, BrakeStatus, Counter, DeviceError, Servo, Zero, drivers};
+use crate::device::{Brake, BrakeStatus, Counter, DeviceError, DeviceKind, Servo, Zero, drivers};
 use crate::link::{Address, Link};
 use crate::profile::Profile;
 use crate::run::session::Links;
@@ -89,34 +89,34 @@ pub async fn examine(profile: &Profile, links: Links, consent: Consent, stop: &S
     let at =
         |device, port: &str, baud, format: &str| Address { device, port: port.into(), baud, format: format.into() };
     let addresses = [
-        at("servo", &servo.port, servo.baud, &servo.format),
-        at("brake", &brake.port, brake.baud, &brake.format),
-        at("counter", &counter.port, counter.baud, &counter.format),
+        at(DeviceKind::Servo, &servo.port, servo.baud, &servo.format),
+        at(DeviceKind::Brake, &brake.port, brake.baud, &brake.format),
+        at(DeviceKind::Counter, &counter.port, counter.baud, &counter.format),
     ];
     for address in &addresses {
         port::examine(&mut report, address);
     }
     if let Some(qsb) = &counter.qsb {
-        port::examine(&mut report, &at("counter", &qsb.output_port, counter.baud, &counter.format));
+        port::examine(&mut report, &at(DeviceKind::Counter, &qsb.output_port, counter.baud, &counter.format));
     }
     let [at_servo, at_brake, at_counter] = addresses;
     let mut servo = match (
         connect(&mut report, links.servo, &at_servo).await,
-        drivers::find(drivers::SERVOS, "servo", &servo.driver),
+        drivers::find(drivers::SERVOS, DeviceKind::Servo, &servo.driver),
     ) {
         (Some(link), Ok(open)) => Some(open(link, at_servo, servo)),
         _ => None,
     };
     let mut brake = match (
         connect(&mut report, links.brake, &at_brake).await,
-        drivers::find(drivers::BRAKES, "brake", &brake.driver),
+        drivers::find(drivers::BRAKES, DeviceKind::Brake, &brake.driver),
     ) {
         (Some(link), Ok(open)) => Some(open(link, at_brake, brake)),
         _ => None,
     };
     let mut counter = match (
         connect(&mut report, links.counter, &at_counter).await,
-        drivers::find(drivers::COUNTERS, "counter", &counter.driver),
+        drivers::find(drivers::COUNTERS, DeviceKind::Counter, &counter.driver),
     ) {
         (Some(link), Ok(open)) => Some(open(link, at_counter, counter)),
         _ => None,
@@ -160,7 +160,7 @@ async fn connect(report: &mut Report, link: Option<Link>, address: &Address) -> 
     match address.open().await {
         Ok(link) => Some(link),
         Err(error) => {
-            report.add(Grade::Fault, address.device, error.to_string(), "see the finding on its port above");
+            report.add(Grade::Fault, address.device.name(), error.to_string(), "see the finding on its port above");
             None
         }
     }

@@ -15,8 +15,8 @@ use super::{Limits, LogPolicy, Profile, ProfileError, Sequence};
 use crate::calibration::Calibration;
 use crate::device::drivers::{BRAKES, COUNTERS, SERVOS, find};
 use crate::device::map::{Map, MapError};
-use crate::device::{map, refused};
-use crate::link::Address;
+use crate::device::{DeviceKind, map, refused};
+use crate::link;
 
 /// Rounds after which a file is taken to be something else altogether.
 const ROUNDS: usize = 200;
@@ -152,9 +152,9 @@ impl Check {
     fn devices(&mut self, profile: &Profile) {
         let (servo, brake, counter) = (&profile.servo, &profile.brake, &profile.counter);
         let unknown = [
-            ("servo", find(SERVOS, "servo", &servo.driver).err()),
-            ("brake", find(BRAKES, "brake", &brake.driver).err()),
-            ("counter", find(COUNTERS, "counter", &counter.driver).err()),
+            ("servo", find(SERVOS, DeviceKind::Servo, &servo.driver).err()),
+            ("brake", find(BRAKES, DeviceKind::Brake, &brake.driver).err()),
+            ("counter", find(COUNTERS, DeviceKind::Counter, &counter.driver).err()),
         ];
         for (section, error) in unknown {
             if let Some(error) = error {
@@ -184,9 +184,8 @@ impl Check {
             ("counter", &counter.port, counter.baud, &counter.format),
         ];
         for (n, (section, port, baud, format)) in lines.iter().enumerate() {
-            let address = Address { device: "line", port: (*port).clone(), baud: *baud, format: (*format).clone() };
-            if let Err(error) = address.check_format() {
-                self.fault(section, "format", &format!("= {format:?}: {error}"));
+            if let Err(error) = link::check_format(format) {
+                self.fault(section, "format", &format!("= {format:?}: line: {error}"));
             }
             if !(300..=12_000_000).contains(baud) {
                 self.fault(section, "baud", &format!("= {baud} must be from 300 to 12000000 bit/s"));

@@ -7,7 +7,6 @@ use tokio::time::{Instant, sleep};
 
 use super::halt::Halt;
 use super::job::Job;
-use super::limits::{KEY_HEAT, KEY_TEMPERATURE};
 use super::observer::RunObserver;
 use super::panic::survive;
 use super::rig::Rig;
@@ -17,7 +16,7 @@ use super::supervisor::Event;
 /// A run that was begun so often without an end is given up.
 const MOST_ATTEMPTS: u32 = 5;
 
-/// DeviceKind of the heat account that has to be free before a run that spent it goes on.
+/// Part of the heat account that has to be free before a run that spent it goes on.
 const COOLED: f64 = 0.25;
 
 /// When a job goes on after it was interrupted.
@@ -53,7 +52,7 @@ impl Policy {
     fn remedy(&self, halt: &Halt) -> Option<Remedy> {
         match halt {
             Halt::Paused => Some(Remedy::AwaitOperator),
-            Halt::Limit { key, .. } if [KEY_TEMPERATURE, KEY_HEAT].contains(key) => self.suspend.map(Remedy::Cool),
+            Halt::Limit(exceeded) if exceeded.limit.is_remedied_by_cooling() => self.suspend.map(Remedy::Cool),
             Halt::EmergencyStop { .. } => self.suspend.map(Remedy::Release),
             // It may be back already: a servo is called while the brake holds.
             _ if halt.lost_part().is_some() && self.reconnect_s > 0.0 => {

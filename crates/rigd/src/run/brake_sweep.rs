@@ -12,6 +12,7 @@ use super::Plan;
 use super::admission::{Terms, admit_heat};
 use super::halt::Halt;
 use super::job::Job;
+use super::limits::Limit;
 use super::rig::Rig;
 use super::sequence;
 use crate::device::DeviceError;
@@ -146,16 +147,7 @@ async fn ask(rig: &mut Rig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Res
     swept.borrow_mut().resolution_nm = at_driver(step);
     let torque_nm = f64::from(rig.profile.servo.sense) * at_driver(percent);
     let limit_nm = rig.profile.limits.load_nm * LARGEST_RATIO;
-    if torque_nm.abs() > limit_nm {
-        return Err(Halt::Limit {
-            quantity: "torque at the driver",
-            value: torque_nm.abs(),
-            limit: limit_nm,
-            unit: "N·m",
-            key: "three times limits.load_nm",
-            advice: "calibrate up to a smaller current (--max-current)",
-        });
-    }
+    Limit::SweepTorque.check(torque_nm.abs(), limit_nm)?;
     Ok((rig.acquisition.borrow().latest.theta1_rad, torque_nm))
 }
 

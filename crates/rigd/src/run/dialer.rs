@@ -30,7 +30,7 @@ impl Dialer {
             DeviceKind::Brake => (&brake.port, brake.baud, &brake.format),
             DeviceKind::Counter => (&counter.port, counter.baud, &counter.format),
         };
-        Address { device: part.name(), port: port.clone(), baud, format: format.clone() }
+        Address { device: part, port: port.clone(), baud, format: format.clone() }
     }
 
     async fn link(&self, link: Option<Link>, address: &Address, part: DeviceKind) -> Result<Link, Halt> {
@@ -50,7 +50,7 @@ impl Dialer {
     /// # Errors
     /// [`Halt::Driver`], [`Halt::Link`].
     pub async fn servo(&self, link: Option<Link>) -> Result<Box<dyn Servo>, Halt> {
-        let driver = drivers::find(drivers::SERVOS, "servo", &self.profile.servo.driver)?;
+        let driver = drivers::find(drivers::SERVOS, DeviceKind::Servo, &self.profile.servo.driver)?;
         let address = self.address(DeviceKind::Servo);
         Ok(driver(self.link(link, &address, DeviceKind::Servo).await?, address, &self.profile.servo))
     }
@@ -60,7 +60,7 @@ impl Dialer {
     /// # Errors
     /// As [`Dialer::servo`].
     pub async fn brake(&self, link: Option<Link>) -> Result<Box<dyn Brake>, Halt> {
-        let driver = drivers::find(drivers::BRAKES, "brake", &self.profile.brake.driver)?;
+        let driver = drivers::find(drivers::BRAKES, DeviceKind::Brake, &self.profile.brake.driver)?;
         let address = self.address(DeviceKind::Brake);
         Ok(driver(self.link(link, &address, DeviceKind::Brake).await?, address, &self.profile.brake))
     }
@@ -70,7 +70,7 @@ impl Dialer {
     /// # Errors
     /// As [`Dialer::servo`].
     pub async fn counter(&self, link: Option<Link>) -> Result<Box<dyn Counter>, Halt> {
-        let driver = drivers::find(drivers::COUNTERS, "counter", &self.profile.counter.driver)?;
+        let driver = drivers::find(drivers::COUNTERS, DeviceKind::Counter, &self.profile.counter.driver)?;
         let address = self.address(DeviceKind::Counter);
         Ok(driver(self.link(link, &address, DeviceKind::Counter).await?, address, &self.profile.counter))
     }

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::admission::Refusal;
+use super::limits::Exceeded;
 use super::supervisor::{Event, State};
 use crate::device::drivers::UnknownDriver;
 use crate::device::{BusError, DeviceError, DeviceKind};
@@ -15,21 +16,8 @@ pub enum Halt {
     #[error("stopped by the operator")]
     Operator,
     /// A limit of the profile.
-    #[error("{quantity} {value:.4} {unit} is over the limit {limit} {unit} of the profile ({key}); {advice}")]
-    Limit {
-        /// What went over.
-        quantity: &'static str,
-        /// How far.
-        value: f64,
-        /// The limit.
-        limit: f64,
-        /// Unit of both.
-        unit: &'static str,
-        /// The profile's key.
-        key: &'static str,
-        /// What to do next.
-        advice: &'static str,
-    },
+    #[error(transparent)]
+    Limit(#[from] Exceeded),
     /// The run was never within the profile's limits.
     #[error(transparent)]
     Refused(#[from] Refusal),
@@ -165,7 +153,7 @@ impl Halt {
         match self {
             Self::Operator => Event::OperatorStop,
             Self::Paused => Event::Finished,
-            Self::Limit { .. } => Event::Limit,
+            Self::Limit(_) => Event::Limit,
             Self::EmergencyStop { .. } => Event::EmergencyStop,
             Self::LeaseExpired { .. } => Event::LeaseExpired,
             _ => match self.lost_part() {
@@ -195,7 +183,7 @@ pub fn lost_part(error: &DeviceError) -> Option<DeviceKind> {
     match error {
         DeviceError::Bus(
             BusError::Silent { device, .. } | BusError::Damaged { device, .. } | BusError::HungUp { device, .. },
-        ) => DeviceKind::ALL.into_iter().find(|part| part.name() == *device),
+        ) => Some(*device),
         DeviceError::Counter { .. } => Some(DeviceKind::Counter),
         _ => None,
     }

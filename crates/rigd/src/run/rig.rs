@@ -268,7 +268,7 @@ impl Rig {
             }
         };
         limits::check(&self.profile.limits, &observed)?;
-        self.heat.check(&self.profile.limits)
+        Ok(self.heat.check(&self.profile.limits)?)
     }
 
     /// The log is still being written.

@@ -14,7 +14,7 @@ use super::observer::RunObserver;
 use super::rig::Rig;
 use super::settle::SettleMonitor;
 use super::supervisor::Event;
-use crate::device::{CounterIdentity, DeviceError};
+use crate::device::{CounterIdentity, DeviceError, DeviceKind};
 
 /// Room on a serial line for a sample of both encoders: two bytes each at speed, and the frame's share.
 const BYTES_A_SAMPLE: f64 = 5.0;
@@ -145,7 +145,7 @@ async fn arm_watchdog(rig: &mut Rig, accept_none: bool) -> Result<(), Halt> {
 }
 
 fn within(
-    device: &'static str,
+    device: DeviceKind,
     port: &str,
     quantity: &'static str,
     value: f64,
@@ -163,9 +163,9 @@ async fn refuse_over_limit(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
     let allowed = rig.servo.max_motor_rpm().await;
     let allowed = rig.note(allowed)?;
     let asked = job.largest_speed_rpm().max(rig.profile.sequence.home_rpm) * rig.profile.servo.reduction;
-    within("servo", &rig.profile.servo.port, "motor speed", asked, allowed, "rpm")?;
+    within(DeviceKind::Servo, &rig.profile.servo.port, "motor speed", asked, allowed, "rpm")?;
     let current = rig.profile.brake.current_a(job.largest_load_nm()).unwrap_or(0.0);
-    within("brake", &rig.profile.brake.port, "coil current", current, rig.brake.max_current_a(), "A")
+    within(DeviceKind::Brake, &rig.profile.brake.port, "coil current", current, rig.brake.max_current_a(), "A")
 }
 
 fn refuse_rate(rig: &Rig, encoders: &CounterIdentity, rate_hz: f64) -> Result<(), Halt> {
@@ -175,11 +175,11 @@ fn refuse_rate(rig: &Rig, encoders: &CounterIdentity, rate_hz: f64) -> Result<()
         rig.acquisition.borrow().event(Level::Info, "rate", what);
         return Ok(());
     }
-    within("counter", &counter.port, "sample rate", rate_hz, encoders.max_rate_hz, "Hz")?;
+    within(DeviceKind::Counter, &counter.port, "sample rate", rate_hz, encoders.max_rate_hz, "Hz")?;
     // A serial line carries a tenth of its baud rate in bytes; sockets and pipes have no such bound.
     if counter.port.starts_with('/') {
         let limit = f64::from(counter.baud) / 10.0 / BYTES_A_SAMPLE;
-        within("counter", &counter.port, "sample rate over its line", rate_hz, limit, "Hz")?;
+        within(DeviceKind::Counter, &counter.port, "sample rate over its line", rate_hz, limit, "Hz")?;
     }
     Ok(())
 }

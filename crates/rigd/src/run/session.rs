@@ -26,6 +26,7 @@ use super::stop::StopRequests;
 use super::supervisor::Event;
 use crate::analysis::Analysis;
 use crate::clock::Clock;
+use crate::device::DeviceKind;
 use crate::device::bus::BusStatistics;
 use crate::device::drivers::{self, UnknownDriver};
 use crate::link::Link;
@@ -315,9 +316,9 @@ pub async fn connect(dialer: &Dialer, links: Links) -> Result<Devices, Halt> {
 /// # Errors
 /// [`UnknownDriver`] lists those that there are.
 pub fn check_drivers(profile: &Profile) -> Result<(), UnknownDriver> {
-    drivers::find(drivers::SERVOS, "servo", &profile.servo.driver)?;
-    drivers::find(drivers::BRAKES, "brake", &profile.brake.driver)?;
-    drivers::find(drivers::COUNTERS, "counter", &profile.counter.driver)?;
+    drivers::find(drivers::SERVOS, DeviceKind::Servo, &profile.servo.driver)?;
+    drivers::find(drivers::BRAKES, DeviceKind::Brake, &profile.brake.driver)?;
+    drivers::find(drivers::COUNTERS, DeviceKind::Counter, &profile.counter.driver)?;
     Ok(())
 }
 

@@ -11,6 +11,7 @@ use super::Plan;
 use super::admission::{Terms, admit_load};
 use super::halt::Halt;
 use super::job::Job;
+use super::limits::{Exceeded, Limit};
 use super::rig::Rig;
 use super::sequence;
 
@@ -66,14 +67,8 @@ pub async fn jog(rig: &mut Rig, jog: Jog, from_rad: &Cell<f64>) -> Result<(), Ha
         fast = if speed_rpm > jog.speed_rpm * TOO_FAST { fast + 1 } else { 0 };
         slow = if elapsed_s > ramp_s && speed_rpm < jog.speed_rpm * TOO_SLOW { slow + 1 } else { 0 };
         if fast >= FAST_POLLS {
-            return Err(Halt::Limit {
-                quantity: "driver speed",
-                value: speed_rpm,
-                limit: jog.speed_rpm * TOO_FAST,
-                unit: "rpm",
-                key: "one and a half times --rpm",
-                advice: "check servo.reduction and the encoder's lines",
-            });
+            let exceeded = Exceeded { limit: Limit::SetUpSpeed, value: speed_rpm, allowed: jog.speed_rpm * TOO_FAST };
+            return Err(Halt::Limit(exceeded));
         }
         if slow >= SLOW_POLLS {
             let now = format!("{speed_rpm:.2} rpm");

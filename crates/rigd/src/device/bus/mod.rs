@@ -21,6 +21,7 @@ mod timing;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use tokio::sync::{mpsc, oneshot};
+use wire::DeviceKind;
 use wire::register_map::{RegisterDef, RegisterError};
 
 pub use error::BusError;
@@ -38,7 +39,7 @@ const WRITES: u32 = 2;
 
 /// Master of one line with one device.
 pub struct Bus {
-    device: &'static str,
+    device: DeviceKind,
     port: String,
     /// Until the first transaction starts its task.
     owner: Option<Owner>,

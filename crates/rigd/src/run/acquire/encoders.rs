@@ -5,7 +5,7 @@ use riglog::proto::Level;
 use riglog::{AngleScale, EncoderMetadata};
 use wire::{SampleFlags, Samples};
 
-use crate::device::{CounterIdentity, DeviceError, Zero};
+use crate::device::{CounterIdentity, DeviceError, DeviceKind, Zero};
 
 /// An index that comes back further off than this part of a line is not the same index: counts were lost, or a disc has slipped.
 const INDEX_TOLERANCE_LINES: f64 = 0.25;
@@ -82,7 +82,7 @@ impl Encoders {
                 return Ok(());
             }
             return Err(DeviceError::Unexpected {
-                device: "counter",
+                device: DeviceKind::Counter,
                 port: port.to_owned(),
                 found: format!("{:?} counts a revolution", identity.counts_per_rev),
                 expected: format!("{known:?}, as when the log was begun (begin a new one for other encoders)"),
