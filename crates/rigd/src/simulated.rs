@@ -110,13 +110,13 @@ pub fn start_in_process(spec: &PlantSpec, rate_hz: f64, seed: u64) -> Result<Lin
 #[must_use]
 pub fn links_to(world: &Rc<RefCell<SimulatedRig>>) -> Links {
     let shared = Rc::clone(world);
-    let dial = move |part: DeviceKind| -> Option<Link> {
+    let dial = move |kind: DeviceKind| -> Option<Link> {
         let (ours, device) = tokio::io::duplex(PIPE_BYTES);
         let (world, profile) = (Rc::clone(&shared), Profile::simulated());
-        let mut unplugged = world.borrow().plug(part)?;
+        let mut unplugged = world.borrow().plug(kind)?;
         tokio::task::spawn_local(async move {
             let served = async {
-                match part {
+                match kind {
                     DeviceKind::Servo => serve::modbus(device, world, servo_slave(&profile)).await,
                     DeviceKind::Brake => serve::modbus(device, world, brake_slave(&profile)).await,
                     DeviceKind::Counter => serve::counter(device, world).await,

@@ -6,15 +6,12 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use gearmodel::Direction;
-use rigd::run::attend::Policy;
 use rigd::run::brake_sweep::{self, SweepPlan, Swept};
-use rigd::run::halt::Halt;
-use rigd::run::progress::Progress;
-use rigd::run::rig::Rig;
-use rigd::run::session::{self, Frame};
+use rigd::run::connected_rig::ConnectedRig;
+use rigd::run::run_job::Policy;
+use rigd::run::session;
 use rigd::run::set_up::{Jog, hold_brake, jog};
-use rigd::simulated;
-use riglog::pair;
+use rigd::run::stop_reason::StopReason;
 use support::bench::{Bench, in_virtual_time};
 
 /// A rig with limits changed by `edit`.
@@ -25,32 +22,25 @@ fn bench(edit: impl FnOnce(&mut Bench)) -> Bench {
 }
 
 /// A job of 10 N·m at 30 rpm, 31.416 W.
-fn job(edit: impl FnOnce(&mut Bench)) -> Option<Halt> {
+fn job(edit: impl FnOnce(&mut Bench)) -> Option<StopReason> {
     in_virtual_time(async {
         let bench = bench(edit);
         let began_rad = driver_rad(&bench);
         let outcome = bench.run(bench.job(1.0), Policy::default()).await;
-        off(&bench, began_rad, outcome.halt)
+        off(&bench, began_rad, outcome.stop_reason)
     })
 }
 
 /// Anything else on the rig.
-fn work(edit: impl FnOnce(&mut Bench), body: impl AsyncFnOnce(&mut Rig) -> Result<(), Halt>) -> Option<Halt> {
+fn work(
+    edit: impl FnOnce(&mut Bench),
+    body: impl AsyncFnOnce(&mut ConnectedRig) -> Result<(), StopReason>,
+) -> Option<StopReason> {
     in_virtual_time(async {
         let bench = bench(edit);
         let began_rad = driver_rad(&bench);
-        let (_, model) = pair::load(None).expect("the built-in pair");
-        let frame = Frame {
-            profile: bench.profile.clone(),
-            model,
-            recorder: bench.recorder(),
-            progress: Progress::new(0.0, true),
-            links: simulated::links_to(&bench.world),
-            clock: bench.clock,
-            stop: bench.stop.clone(),
-        };
-        let outcome = session::with_rig(frame, async |rig| session::once(rig, body).await).await;
-        off(&bench, began_rad, outcome.halt)
+        let outcome = session::with_rig(bench.context(0.0), async |rig| session::once(rig, body).await).await;
+        off(&bench, began_rad, outcome.stop_reason)
     })
 }
 
@@ -60,17 +50,17 @@ fn driver_rad(bench: &Bench) -> f64 {
 }
 
 /// At rest, and where it was refused without ever having moved.
-fn off(bench: &Bench, began_rad: f64, halt: Option<Halt>) -> Option<Halt> {
-    assert!(bench.speed_rpm() < 0.1, "off: {halt:?}");
+fn off(bench: &Bench, began_rad: f64, reason: Option<StopReason>) -> Option<StopReason> {
+    assert!(bench.speed_rpm() < 0.1, "off: {reason:?}");
     let turned_rad = (driver_rad(bench) - began_rad).abs();
-    assert!(halt.is_none() || turned_rad < 0.01, "it turned by {turned_rad} rad");
-    halt
+    assert!(reason.is_none() || turned_rad < 0.01, "it turned by {turned_rad} rad");
+    reason
 }
 
 /// Admitted at the limit, refused a hair beyond it.
-fn both_sides(key: &str, within: Option<Halt>, beyond: Option<Halt>) {
+fn both_sides(key: &str, within: Option<StopReason>, beyond: Option<StopReason>) {
     assert!(within.is_none(), "{key}: {within:?}");
-    let Some(Halt::Refused(refusal)) = beyond else { panic!("{key}: {beyond:?}") };
+    let Some(StopReason::Refused(refusal)) = beyond else { panic!("{key}: {beyond:?}") };
     assert!(refusal.to_string().contains(key), "{key}: {refusal}");
 }
 
@@ -99,11 +89,17 @@ fn turning_and_holding_for_set_up_are_admitted_too() {
             accept_no_watchdog: false,
         };
         let from_rad = Cell::new(0.0);
-        work(|bench| bench.profile.limits.speed_rpm = limit, async |rig: &mut Rig| jog(rig, plan, &from_rad).await)
+        work(
+            |bench| bench.profile.limits.speed_rpm = limit,
+            async |rig: &mut ConnectedRig| jog(rig, plan, &from_rad).await,
+        )
     };
     both_sides("limits.speed_rpm", turn(5.0), turn(4.99));
     let hold = |limit: f64| {
-        work(|bench| bench.profile.limits.load_nm = limit, async |rig: &mut Rig| hold_brake(rig, 10.0, 1.0).await)
+        work(
+            |bench| bench.profile.limits.load_nm = limit,
+            async |rig: &mut ConnectedRig| hold_brake(rig, 10.0, 1.0).await,
+        )
     };
     both_sides("limits.load_nm", hold(10.0), hold(9.99));
 }
@@ -120,7 +116,7 @@ fn the_brakes_calibration_is_admitted_too() {
             rate_hz: 2000.0,
         };
         let swept = Rc::new(RefCell::new(Swept::default()));
-        work(edit, async |rig: &mut Rig| brake_sweep::execute(rig, &plan, &swept).await)
+        work(edit, async |rig: &mut ConnectedRig| brake_sweep::execute(rig, &plan, &swept).await)
     };
     both_sides(
         "limits.speed_rpm",

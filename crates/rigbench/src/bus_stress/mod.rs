@@ -19,7 +19,7 @@ pub use device::{Brake, Counting, Device, Servo, serve};
 
 use super::proxy::{End, FaultPlan, Proxy, Record};
 use rigd::device::DeviceKind;
-use rigd::device::bus::{Bus, BusError, BusStatistics, Horizon, Manners, Span};
+use rigd::device::bus::{Bus, BusError, BusStatistics, LateReplyWindow, BusTiming, Span};
 use rigd::link::{Address, Duplex, Link};
 
 /// What a master is asked to do.
@@ -77,9 +77,9 @@ pub struct Workload {
 #[derive(Debug, Clone, Copy)]
 pub struct Timing {
     /// Of the master.
-    pub manners: Manners,
+    pub manners: BusTiming,
     /// Of the master's memory; faults stay within it.
-    pub horizon: Horizon,
+    pub horizon: LateReplyWindow,
 }
 
 impl Timing {
@@ -87,8 +87,8 @@ impl Timing {
     #[must_use]
     pub fn of_a_drive() -> Self {
         Self {
-            manners: Manners { silence: Duration::from_millis(10), patience: Duration::from_millis(100), attempts: 3 },
-            horizon: Horizon::default(),
+            manners: BusTiming { silence: Duration::from_millis(10), patience: Duration::from_millis(100), attempts: 3 },
+            horizon: LateReplyWindow::default(),
         }
     }
 
@@ -96,8 +96,8 @@ impl Timing {
     #[must_use]
     pub fn brisk() -> Self {
         Self {
-            manners: Manners { silence: Duration::from_millis(2), patience: Duration::from_millis(30), attempts: 3 },
-            horizon: Horizon { late: Duration::from_millis(150), repeated: Duration::from_millis(60) },
+            manners: BusTiming { silence: Duration::from_millis(2), patience: Duration::from_millis(30), attempts: 3 },
+            horizon: LateReplyWindow { late: Duration::from_millis(150), repeated: Duration::from_millis(60) },
         }
     }
 
@@ -111,7 +111,7 @@ impl Timing {
     #[must_use]
     pub fn master(&self, link: Link, work: &Workload) -> Bus {
         let address = Address { device: DeviceKind::Servo, port: "trial".into(), baud: 115_200, format: "8N1".into() };
-        Bus::new(link, address, work.unit, self.manners).with_spans(work.spans).with_horizon(self.horizon)
+        Bus::new(link, address, work.unit, self.manners).with_spans(work.spans).with_late_replies(self.horizon)
     }
 }
 

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::CampaignError;
 use crate::profile::Profile;
 use crate::run::admission::{Terms, admit_heat, admit_load, admit_speed};
-use crate::run::attend::Suspend;
 use crate::run::job::{Kind, RunSpec, Settle};
+use crate::run::run_job::Suspend;
 use crate::run::senses::Senses;
 
 /// Most runs of a plan, repeats included.

@@ -9,7 +9,7 @@ use super::set_up::{self, Common, Task};
 use super::{Exit, fail};
 use crate::quantity::TORQUE;
 use crate::run::admission::{Terms, admit_load};
-use crate::run::rig::Rig;
+use crate::run::connected_rig::ConnectedRig;
 use crate::run::session;
 use crate::run::set_up::hold_brake;
 
@@ -45,8 +45,8 @@ pub fn main(args: &Args) -> Exit {
         figures: &|| json!({"load_nm": args.load, "heat_j": heat_j.get()}),
         words: &|| format!("{:.0} J above what the brake sheds are in its heat account", heat_j.get()),
     };
-    set_up::conduct(&args.common, profile, &task, async |rig: &mut Rig| {
-        let hold = async |rig: &mut Rig| hold_brake(rig, args.load, args.common.seconds).await;
+    set_up::execute(&args.common, profile, &task, async |rig: &mut ConnectedRig| {
+        let hold = async |rig: &mut ConnectedRig| hold_brake(rig, args.load, args.common.seconds).await;
         let outcome = session::once(rig, hold).await;
         heat_j.set(rig.heat.heat_j());
         outcome

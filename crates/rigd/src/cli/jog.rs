@@ -11,7 +11,7 @@ use super::set_up::{self, Common, Refusal, Task};
 use super::{Exit, fail};
 use crate::quantity::SPEED;
 use crate::run::admission::{Terms, admit_speed};
-use crate::run::rig::Rig;
+use crate::run::connected_rig::ConnectedRig;
 use crate::run::session;
 use crate::run::set_up::{Jog, LARGEST_RPM, jog};
 
@@ -98,8 +98,8 @@ pub fn main(args: &Args) -> Exit {
         figures: &|| json!({"direction": direction.to_string(), "speed_rpm": args.rpm, "turned_rad": turned().map(|turns| turns * TAU)}),
         words: &words,
     };
-    set_up::conduct(&args.common, profile, &task, async |rig: &mut Rig| {
-        let outcome = session::once(rig, async |rig: &mut Rig| jog(rig, plan, &from_rad).await).await;
+    set_up::execute(&args.common, profile, &task, async |rig: &mut ConnectedRig| {
+        let outcome = session::once(rig, async |rig: &mut ConnectedRig| jog(rig, plan, &from_rad).await).await;
         to_rad.set(rig.acquisition.borrow().latest.theta1_rad);
         outcome
     })

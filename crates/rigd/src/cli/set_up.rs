@@ -5,15 +5,15 @@ use std::path::PathBuf;
 use riglog::RunMetadata;
 use serde_json::{Value, json};
 
-use super::on_rig::{OnRig, on_rig};
+use super::on_rig::on_rig;
 use super::run::seconds;
 use super::{Exit, fail, print};
 use crate::profile::Profile;
-use crate::run::halt::Halt;
+use crate::run::connected_rig::ConnectedRig;
 use crate::run::registry::Running;
-use crate::run::rig::Rig;
-use crate::run::session::{self, LogHead, Outcome};
+use crate::run::session::{self, LogHead, Outcome, RunConfig};
 use crate::run::set_up::{LARGEST_RPM, RATE_HZ};
+use crate::run::stop_reason::StopReason;
 use riglog::pair;
 
 /// Options of both.
@@ -86,11 +86,11 @@ pub fn load(common: &Common) -> Result<Profile, Box<dyn std::error::Error>> {
 }
 
 /// Does it, and says how it ended.
-pub fn conduct(
+pub fn execute(
     common: &Common,
     profile: Profile,
     task: &Task<'_>,
-    body: impl AsyncFnOnce(&mut Rig) -> (Option<Halt>, Vec<String>),
+    body: impl AsyncFnOnce(&mut ConnectedRig) -> (Option<StopReason>, Vec<String>),
 ) -> Exit {
     let (pair_toml, model) = match pair::load(None) {
         Ok(pair) => pair,
@@ -109,18 +109,16 @@ pub fn conduct(
     }
     let path = session::free_path(&common.logs, &task.name);
     let head = LogHead { operator: common.operator.clone(), note: task.name.clone(), pair_toml, plan_toml: None };
-    let work = OnRig {
+    let config = RunConfig {
         path: path.clone(),
         profile,
         model,
         head,
         conditions: task.conditions.clone(),
-        seed: common.seed,
-        rate_hz: RATE_HZ,
         quiet: common.quiet || common.json,
     };
     let running = Running::register();
-    let outcome = on_rig(work, body);
+    let outcome = on_rig(config, common.seed, RATE_HZ, body);
     drop(running);
     match outcome {
         Ok(outcome) => conclude(common, task, &path, &outcome),
@@ -132,7 +130,7 @@ pub fn conduct(
 }
 
 fn conclude(common: &Common, task: &Task<'_>, path: &std::path::Path, outcome: &Outcome) -> Exit {
-    let ended = outcome.halt.as_ref().map_or_else(|| "done".into(), ToString::to_string);
+    let ended = outcome.stop_reason.as_ref().map_or_else(|| "done".into(), ToString::to_string);
     if common.json {
         let mut answer = json!({
             "schema": task.schema, "log": path.display().to_string(), "ended": ended, "troubles": outcome.troubles,
@@ -147,13 +145,13 @@ fn conclude(common: &Common, task: &Task<'_>, path: &std::path::Path, outcome: &
     for trouble in &outcome.troubles {
         eprintln!("error: {trouble}");
     }
-    match &outcome.halt {
+    match &outcome.stop_reason {
         None if outcome.troubles.is_empty() => Exit::Done,
         None => Exit::Halted,
-        Some(halt @ Halt::Operator) => {
-            eprintln!("{halt}; the motor is off, the brake at zero");
+        Some(reason @ StopReason::Operator) => {
+            eprintln!("{reason}; the motor is off, the brake at zero");
             Exit::Stopped
         }
-        Some(halt) => fail(Exit::Halted, halt),
+        Some(reason) => fail(Exit::Halted, reason),
     }
 }

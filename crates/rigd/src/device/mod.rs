@@ -4,13 +4,13 @@ pub mod bus;
 pub mod counter_box;
 pub mod drivers;
 pub mod dsp7000;
+pub mod lost_device;
 pub mod map;
 pub mod mapped_brake;
 pub mod mapped_servo;
 pub mod qsb;
 pub mod qsb_reader;
 pub mod refused;
-pub mod stand_in;
 pub mod two_clocks;
 
 use std::time::Duration;

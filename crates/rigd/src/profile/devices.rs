@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::device::bus::Horizon;
+use crate::device::bus::LateReplyWindow;
 
 /// The servo drive and its line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,8 +43,8 @@ pub struct ServoProfile {
 impl ServoProfile {
     /// How long answers may come after they were due.
     #[must_use]
-    pub fn horizon(&self) -> Horizon {
-        horizon(self.late_ms, self.repeated_ms)
+    pub fn late_replies(&self) -> LateReplyWindow {
+        late_replies(self.late_ms, self.repeated_ms)
     }
 }
 
@@ -86,8 +86,8 @@ pub struct BrakeProfile {
 impl BrakeProfile {
     /// How long answers may come after they were due.
     #[must_use]
-    pub fn horizon(&self) -> Horizon {
-        horizon(self.late_ms, self.repeated_ms)
+    pub fn late_replies(&self) -> LateReplyWindow {
+        late_replies(self.late_ms, self.repeated_ms)
     }
 
     /// Coil current that loads the driven gear with `load_nm`, by the rising branch; `None` beyond its end.
@@ -136,16 +136,16 @@ impl BrakeProfile {
 }
 
 fn late_ms() -> f64 {
-    Horizon::default().late.as_secs_f64() * 1e3
+    LateReplyWindow::default().late.as_secs_f64() * 1e3
 }
 
 fn repeated_ms() -> f64 {
-    Horizon::default().repeated.as_secs_f64() * 1e3
+    LateReplyWindow::default().repeated.as_secs_f64() * 1e3
 }
 
-fn horizon(late_ms: f64, repeated_ms: f64) -> Horizon {
+fn late_replies(late_ms: f64, repeated_ms: f64) -> LateReplyWindow {
     let time = |ms: f64| Duration::try_from_secs_f64(ms * 1e-3).unwrap_or_default();
-    Horizon { late: time(late_ms), repeated: time(repeated_ms) }
+    LateReplyWindow { late: time(late_ms), repeated: time(repeated_ms) }
 }
 
 /// The counter box.

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::halt::Halt;
+use super::stop_reason::StopReason;
 use crate::device::{Brake, BusError, Counter, DeviceError, DeviceKind, Servo, drivers};
 use crate::link::{Address, Link};
 use crate::profile::Profile;
@@ -23,23 +23,23 @@ impl Dialer {
         Self { profile, redial }
     }
 
-    pub(super) fn address(&self, part: DeviceKind) -> Address {
+    pub(super) fn address(&self, device: DeviceKind) -> Address {
         let Profile { servo, brake, counter, .. } = &self.profile;
-        let (port, baud, format) = match part {
+        let (port, baud, format) = match device {
             DeviceKind::Servo => (&servo.port, servo.baud, &servo.format),
             DeviceKind::Brake => (&brake.port, brake.baud, &brake.format),
             DeviceKind::Counter => (&counter.port, counter.baud, &counter.format),
         };
-        Address { device: part, port: port.clone(), baud, format: format.clone() }
+        Address { device, port: port.clone(), baud, format: format.clone() }
     }
 
-    async fn link(&self, link: Option<Link>, address: &Address, part: DeviceKind) -> Result<Link, Halt> {
+    async fn link(&self, link: Option<Link>, address: &Address, device: DeviceKind) -> Result<Link, StopReason> {
         match (link, &self.redial) {
             (Some(link), _) => Ok(link),
-            (None, Some(redial)) => redial(part).ok_or_else(|| {
+            (None, Some(redial)) => redial(device).ok_or_else(|| {
                 let (device, port) = (address.device, address.port.clone());
                 let reason = "the emulated device is unplugged".into();
-                Halt::Device(DeviceError::Bus(BusError::HungUp { device, port, reason }))
+                StopReason::Device(DeviceError::Bus(BusError::HungUp { device, port, reason }))
             }),
             (None, None) => Ok(address.open().await?),
         }
@@ -48,8 +48,8 @@ impl Dialer {
     /// The servo, on `link` where there is one already.
     ///
     /// # Errors
-    /// [`Halt::Driver`], [`Halt::Link`].
-    pub async fn servo(&self, link: Option<Link>) -> Result<Box<dyn Servo>, Halt> {
+    /// [`StopReason::Driver`], [`StopReason::Link`].
+    pub async fn servo(&self, link: Option<Link>) -> Result<Box<dyn Servo>, StopReason> {
         let driver = drivers::find(drivers::SERVOS, DeviceKind::Servo, &self.profile.servo.driver)?;
         let address = self.address(DeviceKind::Servo);
         Ok(driver(self.link(link, &address, DeviceKind::Servo).await?, address, &self.profile.servo))
@@ -59,7 +59,7 @@ impl Dialer {
     ///
     /// # Errors
     /// As [`Dialer::servo`].
-    pub async fn brake(&self, link: Option<Link>) -> Result<Box<dyn Brake>, Halt> {
+    pub async fn brake(&self, link: Option<Link>) -> Result<Box<dyn Brake>, StopReason> {
         let driver = drivers::find(drivers::BRAKES, DeviceKind::Brake, &self.profile.brake.driver)?;
         let address = self.address(DeviceKind::Brake);
         Ok(driver(self.link(link, &address, DeviceKind::Brake).await?, address, &self.profile.brake))
@@ -69,7 +69,7 @@ impl Dialer {
     ///
     /// # Errors
     /// As [`Dialer::servo`].
-    pub async fn counter(&self, link: Option<Link>) -> Result<Box<dyn Counter>, Halt> {
+    pub async fn counter(&self, link: Option<Link>) -> Result<Box<dyn Counter>, StopReason> {
         let driver = drivers::find(drivers::COUNTERS, DeviceKind::Counter, &self.profile.counter.driver)?;
         let address = self.address(DeviceKind::Counter);
         Ok(driver(self.link(link, &address, DeviceKind::Counter).await?, address, &self.profile.counter))

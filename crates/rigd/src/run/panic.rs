@@ -3,17 +3,17 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::task::Poll;
 
-use super::halt::Halt;
+use super::stop_reason::StopReason;
 
 /// Makes a panic of the sequence a reason to switch off in order, as any other.
-pub async fn survive(sequence: impl Future<Output = Result<(), Halt>>) -> Result<(), Halt> {
+pub async fn survive(sequence: impl Future<Output = Result<(), StopReason>>) -> Result<(), StopReason> {
     let mut sequence = std::pin::pin!(sequence);
     std::future::poll_fn(|context| {
         // The rig is only switched off afterwards, from whatever state it is in.
         catch_unwind(AssertUnwindSafe(|| sequence.as_mut().poll(context))).unwrap_or_else(|panic| {
             let what = panic.downcast_ref::<&str>().map(ToString::to_string);
             let what = what.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
-            Poll::Ready(Err(Halt::Panic { what }))
+            Poll::Ready(Err(StopReason::Panic { what }))
         })
     })
     .await
@@ -30,8 +30,8 @@ mod tests {
             panic!("no such {}", "thing")
         })
         .await;
-        assert!(matches!(outcome, Err(Halt::Panic { what }) if what == "no such thing"));
+        assert!(matches!(outcome, Err(StopReason::Panic { what }) if what == "no such thing"));
         assert!(survive(async { Ok(()) }).await.is_ok());
-        assert!(matches!(survive(async { Err(Halt::Operator) }).await, Err(Halt::Operator)));
+        assert!(matches!(survive(async { Err(StopReason::Operator) }).await, Err(StopReason::Operator)));
     }
 }

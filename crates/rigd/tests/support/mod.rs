@@ -15,7 +15,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rigd::device::DeviceKind;
-use rigd::device::bus::{Bus, Manners};
+use rigd::device::bus::{Bus, BusTiming};
 use rigd::link::Address;
 use rigd::profile::Profile;
 use riglog::proto::Phase;
@@ -197,8 +197,9 @@ impl Sim {
         let address =
             Address { device: DeviceKind::Servo, port: profile.port, baud: profile.baud, format: profile.format };
         let link = runtime.block_on(address.open()).expect("the port opens again");
-        let manners = Manners { silence: Duration::from_millis(10), patience: Duration::from_millis(200), attempts: 3 };
-        Servo { bus: Bus::new(link, address, profile.unit, manners), runtime }
+        let timing =
+            BusTiming { silence: Duration::from_millis(10), patience: Duration::from_millis(200), attempts: 3 };
+        Servo { bus: Bus::new(link, address, profile.unit, timing), runtime }
     }
 }
 

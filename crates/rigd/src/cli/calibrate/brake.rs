@@ -4,24 +4,24 @@ use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
 
+use gearmodel::Direction;
 use gearmodel::calibration::{BrakePoint, COVERAGE, Stated, brake_curves};
-use gearmodel::{Direction, NominalModel};
 use riglog::RunMetadata;
 use serde_json::json;
 
-use super::super::on_rig::{OnRig, on_rig};
+use super::super::on_rig::on_rig;
 use super::super::{Exit, fail};
 use super::{Output, date};
 use crate::calibration::{BrakeCalibration, Calibration};
 use crate::profile::Profile;
 use crate::quantity::{SPEED, TORQUE};
-use crate::run::Plan;
 use crate::run::admission::{Terms, admit_heat, admit_speed};
 use crate::run::brake_sweep::{self, SweepPlan, Swept};
-use crate::run::halt::Halt;
+use crate::run::connected_rig::ConnectedRig;
+use crate::run::plan::RunPlan;
 use crate::run::registry::Running;
-use crate::run::rig::Rig;
-use crate::run::session::{self, LogHead, Outcome};
+use crate::run::session::{self, LogHead, Outcome, RunConfig};
+use crate::run::stop_reason::StopReason;
 use riglog::pair;
 
 /// Sampling while the torque is what counts, Hz.
@@ -73,14 +73,6 @@ pub struct Args {
     output: Output,
 }
 
-/// A rig, and where the log of its calibration goes.
-struct Setup {
-    path: PathBuf,
-    profile: Profile,
-    model: NominalModel,
-    head: LogHead,
-}
-
 /// What is refused before anything moves.
 #[derive(Debug, thiserror::Error)]
 enum Refusal {
@@ -90,15 +82,15 @@ enum Refusal {
 
 /// Runs the command.
 pub fn main(args: &Args) -> Exit {
-    let (setup, plan) = match prepare(args) {
+    let (config, plan) = match prepare(args) {
         Ok(prepared) => prepared,
         Err(error) => return fail(Exit::BadInput, error.as_ref()),
     };
-    let rig = setup.profile.clone();
-    let mean_ratio = setup.model.pair.closure();
+    let rig = config.profile.clone();
+    let mean_ratio = config.model.pair.closure();
     let running = Running::register();
     let swept = Rc::new(RefCell::new(Swept::default()));
-    let outcome = execute(args, setup, &plan, &swept);
+    let outcome = execute(args, config, &plan, &swept);
     drop(running);
     match outcome {
         Err(error) => {
@@ -107,16 +99,16 @@ pub fn main(args: &Args) -> Exit {
         }
         Ok(outcome) => {
             outcome.troubles.iter().for_each(|trouble| eprintln!("error: {trouble}"));
-            match &outcome.halt {
-                Some(halt @ Halt::Operator) => fail(Exit::Stopped, halt),
-                Some(halt) => fail(Exit::Halted, halt),
+            match &outcome.stop_reason {
+                Some(reason @ StopReason::Operator) => fail(Exit::Stopped, reason),
+                Some(reason) => fail(Exit::Halted, reason),
                 None => conclude(args, &rig, &plan, mean_ratio, &swept.borrow()),
             }
         }
     }
 }
 
-fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>> {
+fn prepare(args: &Args) -> Result<(RunConfig, SweepPlan), Box<dyn std::error::Error>> {
     let profile = match &args.profile {
         Some(path) => Profile::load(path)?,
         None => Profile::simulated(),
@@ -149,7 +141,7 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
         rated_torque_nm: args.rated_torque,
         rate_hz: RATE_HZ,
     };
-    let plan = Plan {
+    let plan = RunPlan {
         directions: vec![Direction::Ccw],
         loads_nm: vec![0.0],
         speed_rpm: args.rpm,
@@ -158,25 +150,24 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
         accept_no_watchdog: false,
     };
     let note = "calibration of the brake".into();
-    let setup = Setup {
+    let config = RunConfig {
         path: session::log_path(&args.logs, &plan),
         profile,
         model,
         head: LogHead { operator: args.operator.clone(), note, pair_toml, plan_toml: None },
+        conditions: RunMetadata {
+            direction: Direction::Ccw.to_string(),
+            speed_rpm: vec![args.rpm],
+            ..RunMetadata::default()
+        },
+        quiet: true,
     };
-    Ok((setup, sweep))
+    Ok((config, sweep))
 }
 
-fn execute(args: &Args, setup: Setup, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<Outcome, String> {
-    let Setup { path, profile, model, head } = setup;
-    let conditions = RunMetadata {
-        direction: Direction::Ccw.to_string(),
-        speed_rpm: vec![plan.speed_rpm],
-        ..RunMetadata::default()
-    };
-    let work = OnRig { path, profile, model, head, conditions, seed: args.seed, rate_hz: RATE_HZ, quiet: true };
-    let sweep = async |rig: &mut Rig| brake_sweep::execute(rig, plan, swept).await;
-    on_rig(work, async |rig| session::once(rig, sweep).await)
+fn execute(args: &Args, config: RunConfig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<Outcome, String> {
+    let sweep = async |rig: &mut ConnectedRig| brake_sweep::execute(rig, plan, swept).await;
+    on_rig(config, args.seed, RATE_HZ, async |rig| session::once(rig, sweep).await)
 }
 
 fn conclude(args: &Args, rig: &Profile, plan: &SweepPlan, mean_ratio: f64, swept: &Swept) -> Exit {

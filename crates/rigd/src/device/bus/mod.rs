@@ -9,7 +9,7 @@
 //! 5. consecutive reads are of different lengths: none is sent whose answer could be that of an earlier request (`memory`);
 //! 6. writes are read back, and written again once when they read otherwise.
 //!
-//! What is left: an answer later than [`Horizon`] that also overtakes the order of the line, and damage that a CRC of 16 bits
+//! What is left: an answer later than [`LateReplyWindow`] that also overtakes the order of the line, and damage that a CRC of 16 bits
 //! does not show (never up to three flipped bits or a burst of 16; else once in 65 536 damaged frames).
 
 mod error;
@@ -25,10 +25,10 @@ use wire::DeviceKind;
 use wire::register_map::{RegisterDef, RegisterError};
 
 pub use error::BusError;
-pub use memory::Horizon;
+pub use memory::LateReplyWindow;
 use owner::{Ask, Job, Owner, Range};
 pub use statistics::BusStatistics;
-pub use timing::{Manners, Span};
+pub use timing::{BusTiming, Span};
 
 use crate::link::{Address, Link};
 
@@ -51,11 +51,11 @@ pub struct Bus {
 impl Bus {
     /// A master on `link`. Its task starts with the first transaction, in the runtime that asks for it.
     #[must_use]
-    pub fn new(link: Link, address: Address, unit: u8, manners: Manners) -> Self {
+    pub fn new(link: Link, address: Address, unit: u8, timing: BusTiming) -> Self {
         let statistics = Arc::new(Mutex::new(BusStatistics::default()));
         let (jobs, queue) = mpsc::channel(QUEUE);
         let (device, port) = (address.device, address.port.clone());
-        let owner = Some(Owner::new(link, address, unit, manners, queue, Arc::clone(&statistics)));
+        let owner = Some(Owner::new(link, address, unit, timing, queue, Arc::clone(&statistics)));
         Self { device, port, owner, jobs, task: None, statistics }
     }
 
@@ -68,11 +68,11 @@ impl Bus {
         self
     }
 
-    /// The same with another horizon. Before the first transaction.
+    /// The same with another window. Before the first transaction.
     #[must_use]
-    pub fn with_horizon(mut self, horizon: Horizon) -> Self {
+    pub fn with_late_replies(mut self, late_replies: LateReplyWindow) -> Self {
         if let Some(owner) = &mut self.owner {
-            owner.set_horizon(horizon);
+            owner.set_late_replies(late_replies);
         }
         self
     }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 /// How a device wants its line used.
 #[derive(Debug, Clone, Copy)]
-pub struct Manners {
+pub struct BusTiming {
     /// Silence before a request and after an answer.
     pub silence: Duration,
     /// Longest wait for an answer, beyond its time on the wire.

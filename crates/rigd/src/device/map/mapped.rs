@@ -5,22 +5,22 @@ use std::time::Duration;
 use wire::register_map::{Access, RegisterDef, RegisterKind};
 
 use super::{Map, ModelRules, Step};
-use crate::device::bus::{Bus, BusError, Horizon, Manners, Span};
+use crate::device::bus::{Bus, BusError, BusTiming, LateReplyWindow, Span};
 use crate::link::{Address, Link};
 
 impl Map {
     /// A master of the device's line.
     #[must_use]
-    pub fn bus(&self, link: Link, address: Address, unit: u8, horizon: Horizon) -> Bus {
+    pub fn bus(&self, link: Link, address: Address, unit: u8, late_replies: LateReplyWindow) -> Bus {
         let ms = |value: f64| Duration::from_secs_f64(value * 1e-3);
-        let manners = Manners {
+        let timing = BusTiming {
             silence: ms(self.line.silence_ms),
             patience: ms(self.line.patience_ms),
             attempts: self.line.attempts,
         };
         let spans: Vec<Span> =
             self.line.readable.iter().map(|[first, words]| Span { first: *first, words: *words }).collect();
-        Bus::new(link, address, unit, manners).with_spans(&spans).with_horizon(horizon)
+        Bus::new(link, address, unit, timing).with_spans(&spans).with_late_replies(late_replies)
     }
 }
 

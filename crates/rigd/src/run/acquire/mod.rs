@@ -24,7 +24,7 @@ use crate::summary::TimeSkew;
 use counts::Counts;
 use encoders::Encoders;
 use live_te::LiveTe;
-use recording::Recording;
+use recording::RunState;
 use timestamps::{Before, Dated, Timestamps};
 use two_readers::TwoReaders;
 
@@ -37,7 +37,7 @@ pub struct Acquisition {
     encoders: Encoders,
     readers: TwoReaders,
     counts: Counts,
-    recording: Recording,
+    recording: RunState,
     live_te: LiveTe,
     /// Number after the last sample.
     next_sample: u64,
@@ -63,7 +63,7 @@ impl Acquisition {
             encoders: Encoders::default(),
             readers: TwoReaders::default(),
             counts: Counts::default(),
-            recording: Recording::Idle,
+            recording: RunState::Idle,
             live_te: LiveTe::default(),
             next_sample: 0,
             samples: 0,
@@ -220,7 +220,7 @@ impl Acquisition {
     /// Records `revolutions` whole turns from the next bin edge on.
     pub fn arm(&mut self, conditions: RunConditions, revolutions: f64) {
         self.live_te.begin(&mut self.latest);
-        self.recording = Recording::Armed { conditions, revolutions };
+        self.recording = RunState::Armed { conditions, revolutions };
     }
 
     /// The armed run is over.
@@ -247,7 +247,7 @@ impl Acquisition {
             self.latest.sample_ns += 1;
             self.end_run(self.latest.sample_ns, self.next_sample);
         }
-        self.recording = Recording::Idle;
+        self.recording = RunState::Idle;
     }
 
     /// Writes `/rig/state`, dated by the latest sample.
@@ -329,7 +329,7 @@ impl Acquisition {
             let time_ns = first_ns + index as u64 * u64::from(batch.dt_ns);
             let number = first_sample + index as u64;
             match &self.recording {
-                Recording::Armed { .. } => {
+                RunState::Armed { .. } => {
                     let edge = self.recording.begins_at(self.previous_theta1_rad, theta1);
                     self.previous_theta1_rad = Some(theta1);
                     let Some(edge_rad) = edge else { continue };
@@ -337,15 +337,15 @@ impl Acquisition {
                     written = index;
                     self.begin_run(edge_rad, time_ns, number, arrived);
                 }
-                Recording::Active { .. } if self.recording.ends_at(theta1) => {
+                RunState::Active { .. } if self.recording.ends_at(theta1) => {
                     self.write_part(batch, [first_ns, first_sample], arrived, written, index);
                     written = index;
                     self.end_run(time_ns, number);
                 }
-                Recording::Active { .. } => {}
-                Recording::Idle | Recording::Done { .. } => break,
+                RunState::Active { .. } => {}
+                RunState::Idle | RunState::Done { .. } => break,
             }
-            if let Recording::Active { edge_rad, .. } = self.recording {
+            if let RunState::Active { edge_rad, .. } = self.recording {
                 let theta2 = self.encoders.theta2_rad(self.counts.outputs[index]);
                 let (analysis, status, latest) = (&mut self.analysis, &self.status, &mut self.latest);
                 if let Some(te) = self.live_te.measure(analysis, status, latest, [theta1, theta2], time_ns) {
@@ -358,8 +358,8 @@ impl Acquisition {
     }
 
     fn begin_run(&mut self, edge_rad: f64, began_ns: u64, first_sample: u64, arrived: u64) {
-        let Recording::Armed { conditions, revolutions } = self.recording else { return };
-        self.recording = Recording::Active {
+        let RunState::Armed { conditions, revolutions } = self.recording else { return };
+        self.recording = RunState::Active {
             edge_rad,
             extent_rad: revolutions * TAU,
             sense: conditions.direction.sign(),
@@ -373,9 +373,9 @@ impl Acquisition {
     }
 
     fn end_run(&mut self, end_ns: u64, end_sample: u64) {
-        let Recording::Active { first_sample, began_ns, lost_before, extent_rad, .. } = self.recording else { return };
+        let RunState::Active { first_sample, began_ns, lost_before, extent_rad, .. } = self.recording else { return };
         let arrived = self.clock.now_ns();
-        self.recording = Recording::Done { revolutions: (extent_rad / TAU).round() };
+        self.recording = RunState::Done { revolutions: (extent_rad / TAU).round() };
         self.status.phase = Phase::Approach;
         self.write_state_at(arrived, end_ns, end_sample);
         if let Some(clocks) = self.readers.book(&self.analysis.model().pair, self.status.speed_setpoint_rpm) {

@@ -7,7 +7,7 @@ use gearmodel::measure::{AngleGrid, RunConditions};
 
 /// The state of recording a run.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Recording {
+pub(super) enum RunState {
     Idle,
     /// Begins at the next bin edge.
     Armed {
@@ -28,7 +28,7 @@ pub(super) enum Recording {
     },
 }
 
-impl Recording {
+impl RunState {
     /// A run is armed or active: its samples have to be looked at one by one.
     pub fn is_on(&self) -> bool {
         matches!(self, Self::Armed { .. } | Self::Active { .. })

@@ -11,7 +11,7 @@ use crate::link::LinkError;
 
 /// Why a run ends before its time.
 #[derive(Debug, Error)]
-pub enum Halt {
+pub enum StopReason {
     /// Ctrl-C, SIGTERM or `rigd stop`.
     #[error("stopped by the operator")]
     Operator,
@@ -66,10 +66,10 @@ pub enum Halt {
         state: State,
     },
     /// A lost device did not come back.
-    #[error("{part} did not come back within {patience_s} s: {last}")]
+    #[error("{device} did not come back within {patience_s} s: {last}")]
     NotBack {
         /// Which.
-        part: DeviceKind,
+        device: DeviceKind,
         /// How long was waited.
         patience_s: f64,
         /// What it said last.
@@ -146,7 +146,7 @@ pub enum Halt {
     Journal(#[from] crate::campaign::CampaignError),
 }
 
-impl Halt {
+impl StopReason {
     /// What it means to the supervisor.
     #[must_use]
     pub fn event(&self) -> Event {
@@ -156,7 +156,7 @@ impl Halt {
             Self::Limit(_) => Event::Limit,
             Self::EmergencyStop { .. } => Event::EmergencyStop,
             Self::LeaseExpired { .. } => Event::LeaseExpired,
-            _ => match self.lost_part() {
+            _ => match self.lost_device() {
                 Some(DeviceKind::Servo) => Event::ServoLost,
                 Some(DeviceKind::Brake) => Event::BrakeLost,
                 Some(DeviceKind::Counter) => Event::EncodersLost,
@@ -167,11 +167,11 @@ impl Halt {
 
     /// The device that does not answer any more, where that is the reason: it may come back.
     #[must_use]
-    pub fn lost_part(&self) -> Option<DeviceKind> {
+    pub fn lost_device(&self) -> Option<DeviceKind> {
         match self {
-            Self::Device(error) => lost_part(error),
+            Self::Device(error) => lost_device(error),
             Self::EncodersSilent { .. } => Some(DeviceKind::Counter),
-            Self::NotBack { part, .. } => Some(*part),
+            Self::NotBack { device, .. } => Some(*device),
             _ => None,
         }
     }
@@ -179,7 +179,7 @@ impl Halt {
 
 /// The device that an error says is gone; `None` for one that answers, but not as it should.
 #[must_use]
-pub fn lost_part(error: &DeviceError) -> Option<DeviceKind> {
+pub fn lost_device(error: &DeviceError) -> Option<DeviceKind> {
     match error {
         DeviceError::Bus(
             BusError::Silent { device, .. } | BusError::Damaged { device, .. } | BusError::HungUp { device, .. },
