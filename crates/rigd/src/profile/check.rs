@@ -165,7 +165,7 @@ impl Check {
         for (section, driver, map) in [("servo", &servo.driver, &servo.map), ("brake", &brake.driver, &brake.map)] {
             match (driver.as_str(), map) {
                 (map::DRIVER, None) => {
-                    self.fault(section, "map", "is missing: driver \"map\" needs map = \"FILE.toml\"")
+                    self.fault(section, "map", "is missing: driver \"map\" needs map = \"FILE.toml\"");
                 }
                 (map::DRIVER, Some(file)) => self.map(section, file),
                 (_, Some(file)) => {
