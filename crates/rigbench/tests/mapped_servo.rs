@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use rigbench::bus_stress::{Device, Servo as EmulatedDrive, Workload, serve};
 use rigd::device::mapped_servo::open;
-use rigd::device::{DeviceError, Servo};
+use rigd::device::{DeviceError, DeviceKind, Servo};
 use rigd::link::Address;
 use rigd::profile::{Profile, ServoProfile};
 use rigsim::emulator::Reply;
@@ -69,7 +69,7 @@ async fn with<T>(map: &str, drive: Keeping, work: impl AsyncFnOnce(&mut dyn Serv
 
 async fn with_profile<T>(profile: &ServoProfile, drive: Keeping, work: impl AsyncFnOnce(&mut dyn Servo) -> T) -> T {
     let (near, far) = tokio::io::duplex(1024);
-    let address = Address { device: "servo", port: "x".into(), baud: 38_400, format: "8N2".into() };
+    let address = Address { device: DeviceKind::Servo, port: "x".into(), baud: 38_400, format: "8N2".into() };
     let mut servo = open(Box::new(near), address, profile);
     let served = serve(far, drive);
     tokio::select! {
@@ -143,7 +143,7 @@ async fn torque_comes_with_its_sign_and_step() {
 #[test]
 fn only_the_emergency_stops_code_is_one() {
     let (link, _far) = tokio::io::duplex(16);
-    let address = Address { device: "servo", port: "x".into(), baud: 38_400, format: "8N2".into() };
+    let address = Address { device: DeviceKind::Servo, port: "x".into(), baud: 38_400, format: "8N2".into() };
     let servo = open(Box::new(link), address, &Profile::simulated().servo);
     assert!(servo.is_emergency_stop(ALARM_EMERGENCY_STOP) && !servo.is_emergency_stop(ALARM_COMMUNICATION_TIMEOUT));
 }

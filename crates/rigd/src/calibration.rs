@@ -6,8 +6,6 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::profile::Profile;
-
 /// Name of the attachment in logs.
 pub const ATTACHMENT: &str = "calibration.toml";
 /// Schema of the file.
@@ -207,15 +205,6 @@ impl Calibration {
         std::fs::write(&beside, toml::to_string(self).unwrap_or_default()).map_err(file)?;
         std::fs::rename(&beside, path).map_err(file)
     }
-
-    /// Puts what a run needs into its profile.
-    pub fn apply(&self, profile: &mut Profile) {
-        if let Some(brake) = &self.brake {
-            let points = |branch: &[[f64; 3]]| branch.iter().map(|point| [point[0], point[1]]).collect();
-            profile.brake.rising = points(&brake.rising);
-            profile.brake.falling = points(&brake.falling);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -237,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_calibration_comes_back_and_changes_the_brake_of_the_profile() {
+    fn a_calibration_comes_back() {
         let directory = tempfile::TempDir::new().unwrap();
         let path = directory.path().join("calibration.toml");
         assert_eq!(Calibration::load_or_new(&path).unwrap(), Calibration::default());
@@ -245,14 +234,6 @@ mod tests {
         let (again, text) = Calibration::load(&path).unwrap();
         assert_eq!(again, calibration());
         assert!(text.contains("2026-11-22"));
-        let mut profile = Profile::simulated();
-        again.apply(&mut profile);
-        assert_eq!(profile.brake.rising, [[0.0, 0.3], [0.5, 10.0]]);
-        let near = |current: Option<f64>| (current.unwrap() - 0.25).abs() < 1e-12;
-        assert!(near(profile.brake.current_a(5.15)));
-        // Down from more current the torque lies on the other branch.
-        assert!(near(profile.brake.current_from_a(5.65, 0.4)));
-        assert!(near(profile.brake.current_from_a(5.15, 0.1)));
     }
 
     #[test]

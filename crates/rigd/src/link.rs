@@ -5,6 +5,7 @@ use std::time::Duration;
 use thiserror::Error;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio_serial::{DataBits, Parity, SerialPort as _, SerialPortBuilderExt as _, SerialStream, StopBits};
+use wire::DeviceKind;
 
 /// Anything that carries bytes both ways.
 pub trait Duplex: AsyncRead + AsyncWrite + Unpin + Send {}
@@ -17,7 +18,7 @@ pub type Link = Box<dyn Duplex>;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Address {
     /// Which device, for messages.
-    pub device: &'static str,
+    pub device: DeviceKind,
     /// Path or `tcp://host:port`.
     pub port: String,
     /// Line speed, bit/s.
@@ -26,16 +27,23 @@ pub struct Address {
     pub format: String,
 }
 
+/// A character format that is not one of ours.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("format '{format}' is not DATA PARITY STOP; write for instance 8N1 or 8N2")]
+pub struct FormatError {
+    format: String,
+}
+
 /// Why a link could not be opened.
 #[derive(Debug, Error)]
 pub enum LinkError {
     /// The character format is not one of ours.
-    #[error("{device}: format '{format}' is not DATA PARITY STOP; write for instance 8N1 or 8N2")]
+    #[error("{device}: {source}")]
     Format {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// What was given.
-        format: String,
+        source: FormatError,
     },
     /// The port could not be opened.
     #[error(
@@ -43,7 +51,7 @@ pub enum LinkError {
     )]
     Open {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// The port.
         port: String,
         /// The reason.
@@ -53,7 +61,7 @@ pub enum LinkError {
     #[error("{device}: {port} did not accept a connection within {seconds} s; check address, power and network")]
     ConnectTimeout {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// The address.
         port: String,
         /// How long was waited.
@@ -84,7 +92,8 @@ impl Address {
             stream.set_nodelay(true).map_err(failed)?;
             return Ok(Box::new(stream));
         }
-        let (data, parity, stop) = self.line_format()?;
+        let (data, parity, stop) =
+            line_format(&self.format).map_err(|source| LinkError::Format { device: self.device, source })?;
         let port: SerialStream = tokio_serial::new(&self.port, self.baud)
             .data_bits(data)
             .parity(parity)
@@ -95,36 +104,36 @@ impl Address {
         port.clear(tokio_serial::ClearBuffer::All).map_err(|error| failed(error.into()))?;
         Ok(Box::new(port))
     }
+}
 
-    /// Whether the character format is one of ours.
-    ///
-    /// # Errors
-    /// [`LinkError::Format`].
-    pub fn check_format(&self) -> Result<(), LinkError> {
-        self.line_format().map(drop)
-    }
+/// Whether a character format is one of ours.
+///
+/// # Errors
+/// [`FormatError`].
+pub fn check_format(format: &str) -> Result<(), FormatError> {
+    line_format(format).map(drop)
+}
 
-    fn line_format(&self) -> Result<(DataBits, Parity, StopBits), LinkError> {
-        let refuse = || LinkError::Format { device: self.device, format: self.format.clone() };
-        let mut parts = self.format.chars();
-        let data = match parts.next() {
-            Some('7') => DataBits::Seven,
-            Some('8') => DataBits::Eight,
-            _ => return Err(refuse()),
-        };
-        let parity = match parts.next() {
-            Some('N') => Parity::None,
-            Some('E') => Parity::Even,
-            Some('O') => Parity::Odd,
-            _ => return Err(refuse()),
-        };
-        let stop = match (parts.next(), parts.next()) {
-            (Some('1'), None) => StopBits::One,
-            (Some('2'), None) => StopBits::Two,
-            _ => return Err(refuse()),
-        };
-        Ok((data, parity, stop))
-    }
+fn line_format(format: &str) -> Result<(DataBits, Parity, StopBits), FormatError> {
+    let refuse = || FormatError { format: format.to_owned() };
+    let mut parts = format.chars();
+    let data = match parts.next() {
+        Some('7') => DataBits::Seven,
+        Some('8') => DataBits::Eight,
+        _ => return Err(refuse()),
+    };
+    let parity = match parts.next() {
+        Some('N') => Parity::None,
+        Some('E') => Parity::Even,
+        Some('O') => Parity::Odd,
+        _ => return Err(refuse()),
+    };
+    let stop = match (parts.next(), parts.next()) {
+        (Some('1'), None) => StopBits::One,
+        (Some('2'), None) => StopBits::Two,
+        _ => return Err(refuse()),
+    };
+    Ok((data, parity, stop))
 }
 
 #[cfg(test)]
@@ -132,15 +141,15 @@ mod tests {
     use super::*;
 
     fn address(port: &str, format: &str) -> Address {
-        Address { device: "servo", port: port.into(), baud: 38400, format: format.into() }
+        Address { device: DeviceKind::Servo, port: port.into(), baud: 38400, format: format.into() }
     }
 
     #[test]
     fn formats() {
-        assert_eq!(address("x", "8N2").line_format().ok(), Some((DataBits::Eight, Parity::None, StopBits::Two)));
-        assert_eq!(address("x", "7E1").line_format().ok(), Some((DataBits::Seven, Parity::Even, StopBits::One)));
+        assert_eq!(line_format("8N2").ok(), Some((DataBits::Eight, Parity::None, StopBits::Two)));
+        assert_eq!(line_format("7E1").ok(), Some((DataBits::Seven, Parity::Even, StopBits::One)));
         for wrong in ["", "8", "8N", "8N3", "9N1", "8X1", "8N11"] {
-            assert!(address("x", wrong).line_format().is_err(), "{wrong}");
+            assert!(line_format(wrong).is_err(), "{wrong}");
         }
     }
 

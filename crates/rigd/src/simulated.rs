@@ -164,7 +164,7 @@ fn read_by_qsb(profile: &mut Profile, [input, output]: [String; 2], lines: [u32;
     let counter = &mut profile.counter;
     counter.driver = crate::profile::qsb::DRIVER.into();
     (counter.port, counter.baud) = (input, wire::qsb::BAUD);
-    counter.qsb = Some(crate::profile::qsb::QsbProfile {
+    counter.qsb = Some(crate::profile::QsbProfile {
         output_port: output,
         lines,
         quadrature: 4,

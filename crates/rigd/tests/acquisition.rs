@@ -15,7 +15,7 @@ use riglog::pair;
 use riglog::proto::Phase;
 use riglog::{LogReader, Record, WriterOptions};
 use tempfile::TempDir;
-use wire::counter_box::{SampleFlags, Samples};
+use wire::{SampleFlags, Samples};
 
 const COUNTS: u64 = 7_200_000;
 const DT_NS: u32 = 100_000;

@@ -8,7 +8,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use rand::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
-use rigd::device::COUNTERS;
+use rigd::device::DeviceKind;
+use rigd::device::drivers::COUNTERS;
 use rigd::link::Address;
 use rigd::profile::Profile;
 use riglog::proto::Phase;
@@ -194,8 +195,12 @@ fn check(all: &[Left]) {
 /// Watches the shafts by the encoders alone, for any word to the servo would feed its watchdog; returns when they stood still.
 fn standstill_by_encoders(profile: &Profile, seconds: f64) -> Instant {
     let counter = &profile.counter;
-    let address =
-        Address { device: "counter", port: counter.port.clone(), baud: counter.baud, format: counter.format.clone() };
+    let address = Address {
+        device: DeviceKind::Counter,
+        port: counter.port.clone(),
+        baud: counter.baud,
+        format: counter.format.clone(),
+    };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
     runtime.block_on(async {
         let link = address.open().await.expect("the counter's port opens again");

@@ -5,9 +5,9 @@ mod support;
 
 use std::time::Duration;
 
-use rigd::run::attend::Policy;
-use rigd::run::halt::Halt;
-use rigd::run::limits::{KEY_HEAT, KEY_TEMPERATURE};
+use rigd::run::limits::Limit;
+use rigd::run::run_job::Policy;
+use rigd::run::stop_reason::StopReason;
 use support::bench::{Bench, in_virtual_time};
 use tokio::time::sleep;
 
@@ -16,7 +16,7 @@ fn disturbed(
     edit: impl FnOnce(&mut Bench),
     revolutions: f64,
     fault: impl AsyncFnOnce(Bench) + 'static,
-) -> (Option<Halt>, Bench) {
+) -> (Option<StopReason>, Bench) {
     in_virtual_time(async {
         let mut bench = Bench::new(21);
         edit(&mut bench);
@@ -31,18 +31,18 @@ fn disturbed(
         hands.abort();
         assert!(outcome.troubles.is_empty(), "{:?}", outcome.troubles);
         assert!(bench.speed_rpm() < 0.1, "at rest, whatever happened");
-        (outcome.halt, bench)
+        (outcome.stop_reason, bench)
     })
 }
 
 /// Stopped by the limit of this key, which the log names.
-fn assert_over(key: &str, (halt, bench): (Option<Halt>, Bench)) {
-    assert!(matches!(&halt, Some(Halt::Limit { key: found, .. }) if *found == key), "{key}: {halt:?}");
+fn assert_over(key: &str, (reason, bench): (Option<StopReason>, Bench)) {
+    assert!(matches!(&reason, Some(StopReason::Limit(exceeded)) if exceeded.limit.key() == key), "{key}: {reason:?}");
     bench.event("halt", key);
 }
 
-fn assert_within(what: &str, (halt, _): (Option<Halt>, Bench)) {
-    assert!(halt.is_none(), "{what}: {halt:?}");
+fn assert_within(what: &str, (reason, _): (Option<StopReason>, Bench)) {
+    assert!(reason.is_none(), "{what}: {reason:?}");
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn brake_heat() {
         }
     };
     assert_within("70 s of it", disturbed(limit, 60.0, fault(70)));
-    assert_over(KEY_HEAT, disturbed(limit, 60.0, fault(100)));
+    assert_over(Limit::BrakeHeat.key(), disturbed(limit, 60.0, fault(100)));
 }
 
 #[test]
@@ -74,7 +74,7 @@ fn brake_temperature() {
     // The brake stands at 22 °C and warms by a degree or two; its limit is 80 °C.
     let fault = |by_c| async move |bench: Bench| bench.world.borrow_mut().heat_brake_by(by_c);
     assert_within("75 °C", disturbed(|_| {}, 4.0, fault(53.0)));
-    assert_over(KEY_TEMPERATURE, disturbed(|_| {}, 4.0, fault(60.0)));
+    assert_over(Limit::BrakeTemperature.key(), disturbed(|_| {}, 4.0, fault(60.0)));
 }
 
 #[test]
@@ -87,10 +87,10 @@ fn encoder_silence() {
         }
     };
     // The limit is 500 ms; what was sent meanwhile is lost, counted, and ends nothing.
-    let (halt, bench) = disturbed(|_| {}, 4.0, fault(400));
-    assert!(halt.is_none(), "400 ms: {halt:?}");
+    let (reason, bench) = disturbed(|_| {}, 4.0, fault(400));
+    assert!(reason.is_none(), "400 ms: {reason:?}");
     assert!(bench.replayed().1.losses > 0, "and the loss is in the log");
-    let (halt, bench) = disturbed(|_| {}, 4.0, fault(700));
-    assert!(matches!(&halt, Some(Halt::EncodersSilent { limit_ms: 500.0, .. })), "{halt:?}");
+    let (reason, bench) = disturbed(|_| {}, 4.0, fault(700));
+    assert!(matches!(&reason, Some(StopReason::EncodersSilent { limit_ms: 500.0, .. })), "{reason:?}");
     bench.event("halt", "limits.encoder_silence_ms");
 }

@@ -12,15 +12,13 @@ use std::time::Duration;
 use nix::sys::signal::Signal;
 use rigd::doctor::{self, Consent, Grade};
 use rigd::profile::Profile;
-use rigd::run::halt::Halt;
-use rigd::run::limits::KEY_HEAT;
-use rigd::run::progress::Progress;
-use rigd::run::reconnect::Dialer;
-use rigd::run::rig::Rig;
-use rigd::run::session::{self, Frame};
+use rigd::run::connected_rig::ConnectedRig;
+use rigd::run::dialer::Dialer;
+use rigd::run::limits::{Exceeded, Limit};
+use rigd::run::session;
 use rigd::run::set_up::hold_brake;
+use rigd::run::stop_reason::StopReason;
 use rigd::simulated;
-use riglog::pair;
 use serde_json::Value;
 use support::bench::{Bench, events, in_virtual_time};
 use support::{Ended, Run, Sim, rigd, wait_for};
@@ -228,7 +226,7 @@ fn a_brake_torque_over_a_limit_is_refused() {
 }
 
 /// Holds 10 N·m for `seconds` while another master drives the gear at 30 rpm: 31.4 W, of which 25 W may go on for ever.
-fn held_against_a_turning_gear(seconds: f64) -> (Option<Halt>, f64) {
+fn held_against_a_turning_gear(seconds: f64) -> (Option<StopReason>, f64) {
     in_virtual_time(async {
         let mut bench = Bench::new(12);
         bench.profile.limits.slip_power_w = 25.0;
@@ -248,31 +246,21 @@ fn held_against_a_turning_gear(seconds: f64) -> (Option<Halt>, f64) {
                 }
             })
         };
-        let (_, model) = pair::load(None).expect("the built-in pair");
-        let frame = Frame {
-            profile: bench.profile.clone(),
-            model,
-            recorder: bench.recorder(),
-            progress: Progress::new(0.0, true),
-            links: simulated::links_to(&bench.world),
-            clock: bench.clock,
-            stop: bench.stop.clone(),
-        };
-        let work = async |rig: &mut Rig| hold_brake(rig, 10.0, seconds).await;
-        let outcome = session::with_rig(frame, async |rig| session::once(rig, work).await).await;
+        let work = async |rig: &mut ConnectedRig| hold_brake(rig, 10.0, seconds).await;
+        let outcome = session::with_rig(bench.context(0.0), async |rig| session::once(rig, work).await).await;
         hands.abort();
         // The powder takes its time to let go.
         tokio::time::sleep(Duration::from_secs(3)).await;
-        (outcome.halt, bench.brake_torque_nm())
+        (outcome.stop_reason, bench.brake_torque_nm())
     })
 }
 
 #[test]
 fn the_heat_account_holds_where_somebody_turns_the_gear() {
     // The account of 60 s · 25 W is full after 1500 J / 6.4 W = 234 s.
-    let (halt, _) = held_against_a_turning_gear(200.0);
-    assert!(halt.is_none(), "{halt:?}");
-    let (halt, torque_nm) = held_against_a_turning_gear(300.0);
-    assert!(matches!(halt, Some(Halt::Limit { key: KEY_HEAT, .. })), "{halt:?}");
+    let (reason, _) = held_against_a_turning_gear(200.0);
+    assert!(reason.is_none(), "{reason:?}");
+    let (reason, torque_nm) = held_against_a_turning_gear(300.0);
+    assert!(matches!(reason, Some(StopReason::Limit(Exceeded { limit: Limit::BrakeHeat, .. }))), "{reason:?}");
     assert!(torque_nm < 1.0, "and the brake is at zero: {torque_nm} N·m");
 }

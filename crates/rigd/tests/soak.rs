@@ -11,15 +11,16 @@ use std::time::Duration;
 
 use rand::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
-use rigd::campaign::conduct::Conductor;
 use rigd::campaign::estimate::estimate;
 use rigd::campaign::journal::Journal;
+use rigd::campaign::observer::CampaignObserver;
 use rigd::campaign::plan::CampaignPlan;
 use rigd::campaign::schedule::Schedule;
 use rigd::device::DeviceKind;
-use rigd::run::attend::Policy;
 use rigd::run::job::Job;
-use rigd::run::session::{self, LogHead, Work};
+use rigd::run::progress::Progress;
+use rigd::run::run_job::Policy;
+use rigd::run::session::{self, JobSpec, LogHead, SessionContext};
 use rigd::simulated;
 use riglog::pair;
 use riglog::{LogReader, Record};
@@ -147,7 +148,7 @@ fn soak(hours: f64, seed: u64) {
         let journal = Journal::open(&directory, &schedule.fingerprint).expect("a journal");
         let (pair_toml, model) = pair::load(None).expect("the built-in pair");
         let head = LogHead { pair_toml, ..LogHead::default() };
-        let mut conductor = Conductor::new(
+        let mut observer = CampaignObserver::new(
             (&directory, journal),
             bench.profile.clone(),
             head,
@@ -155,7 +156,7 @@ fn soak(hours: f64, seed: u64) {
             (schedule, indices, found.clone()),
             true,
         );
-        let recorder = conductor.begin().expect("a log");
+        let recorder = observer.begin().expect("a log");
         let done = Rc::new(RefCell::new(Done::default()));
         let hands = tokio::task::spawn_local(disturb(bench.clone(), Rc::clone(&done), seed));
         let memory = Rc::new(RefCell::new(Vec::new()));
@@ -171,17 +172,24 @@ fn soak(hours: f64, seed: u64) {
         };
         let policy = Policy { reconnect_s: plan.reconnect_s, suspend: plan.suspend() };
         let job = Job::new(runs.clone(), plan.rate_hz, 0);
-        let work = Work { profile: bench.profile.clone(), model, job, policy, quiet: true };
-        let links = simulated::links_to(&bench.world);
+        let context = SessionContext {
+            profile: bench.profile.clone(),
+            model,
+            recorder,
+            progress: Progress::new(job.revolutions(), true),
+            links: simulated::links_to(&bench.world),
+            clock: bench.clock,
+            stop: bench.stop.clone(),
+        };
         let began = bench.clock.now_ns();
-        let outcome = session::conduct(work, recorder, &mut conductor, links, bench.clock, bench.stop.clone()).await;
+        let outcome = session::execute_job(context, JobSpec { job, policy }, &mut observer).await;
         let took_h = (bench.clock.now_ns() - began) as f64 / 3.6e12;
         hands.abort();
         watch.abort();
-        conductor.conclude(outcome.finalised, outcome.halt.as_ref()).expect("the journal");
+        observer.conclude(outcome.finalised, outcome.stop_reason.as_ref()).expect("the journal");
 
-        assert!(outcome.halt.is_none(), "{:?}", outcome.halt);
-        let finished = conductor.all_finished();
+        assert!(outcome.stop_reason.is_none(), "{:?}", outcome.stop_reason);
+        let finished = observer.all_finished();
         assert_eq!(finished.len(), runs.len(), "every run finished");
         let mut logs = Vec::new();
         for place in [directory.clone(), directory.join("unfinished")] {
@@ -206,7 +214,7 @@ fn soak(hours: f64, seed: u64) {
              {missing} missing and all of them told, resident {:?} MiB",
             done.borrow().all(),
             done.borrow(),
-            conductor.interruptions.len(),
+            observer.interruptions.len(),
             finished.len(),
             runs.len(),
             logs.len(),

@@ -12,31 +12,8 @@ use crate::{
     error::LogError,
     metadata::{EncoderMetadata, MetadataMap, RunMetadata},
     run_stream::RunStream,
+    survey::{AttachmentInfo, ChannelInfo},
 };
-
-/// A channel and how much it carries.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ChannelInfo {
-    /// The topic.
-    pub topic: String,
-    /// The message type.
-    pub schema: String,
-    /// Number of messages.
-    pub messages: u64,
-}
-
-/// An attached file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct AttachmentInfo {
-    /// Its name.
-    pub name: String,
-    /// Its media type.
-    pub media_type: String,
-    /// Its size.
-    pub bytes: u64,
-    /// Its content, up to 1 MiB.
-    pub data: Option<Vec<u8>>,
-}
 
 /// A run and how much was recorded in it.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,6 @@ use prost::Message;
 use crate::{
     completeness::Completeness,
     error::LogError,
-    info::{AttachmentInfo, ChannelInfo},
     metadata::{EncoderMetadata, MetadataMap, RunMetadata},
     parts::{LogParts, PartMetadata},
     proto::{AngleBatch, RigState},
@@ -19,6 +18,30 @@ use crate::{
 
 /// Attachments up to this size are kept in memory; a rig's are profiles of some kilobytes.
 const KEPT_ATTACHMENT_BYTES: usize = 1 << 20;
+
+/// A channel and how much it carries.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChannelInfo {
+    /// The topic.
+    pub topic: String,
+    /// The message type.
+    pub schema: String,
+    /// Number of messages.
+    pub messages: u64,
+}
+
+/// An attached file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AttachmentInfo {
+    /// Its name.
+    pub name: String,
+    /// Its media type.
+    pub media_type: String,
+    /// Its size.
+    pub bytes: u64,
+    /// Its content, up to 1 MiB.
+    pub data: Option<Vec<u8>>,
+}
 
 /// What a log says about itself.
 #[derive(Debug, Clone)]

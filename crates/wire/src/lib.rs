@@ -13,6 +13,8 @@
 //! | [`dsp7000`] | Magtrol DSP7000 dynamometer controller | `docs/wire/dsp7000.md` |
 //! | [`qsb`] | US Digital QSB encoder readers | `docs/wire/qsb.md` |
 //! | [`counter_box`] | the rig's own two-channel counter box | `docs/wire/counter-box.md` |
+//!
+//! Whatever reads the encoders gives [`Samples`].
 
 pub mod asda_b2;
 pub mod counter_box;
@@ -23,6 +25,8 @@ pub mod modbus;
 pub mod qsb;
 pub mod rd60xx;
 pub mod register_map;
+mod samples;
 
 pub use device_kind::DeviceKind;
 pub use hex::Hex;
+pub use samples::{SampleFlags, Samples};

@@ -20,7 +20,8 @@ pub use device::{Brake, Counting, Device, Servo, serve};
 pub use workload::Workload;
 
 use super::proxy::{End, FaultPlan, Proxy, Record};
-use rigd::device::bus::{Bus, BusError, BusStatistics, Horizon, Manners};
+use rigd::device::DeviceKind;
+use rigd::device::bus::{Bus, BusError, BusStatistics, BusTiming, LateReplyWindow};
 use rigd::link::{Address, Duplex, Link};
 
 /// What a master is asked to do.
@@ -65,9 +66,9 @@ fn told(error: &BusError) -> Told {
 #[derive(Debug, Clone, Copy)]
 pub struct Timing {
     /// Of the master.
-    pub manners: Manners,
+    pub manners: BusTiming,
     /// Of the master's memory; faults stay within it.
-    pub horizon: Horizon,
+    pub horizon: LateReplyWindow,
 }
 
 impl Timing {
@@ -75,8 +76,12 @@ impl Timing {
     #[must_use]
     pub fn of_a_drive() -> Self {
         Self {
-            manners: Manners { silence: Duration::from_millis(10), patience: Duration::from_millis(100), attempts: 3 },
-            horizon: Horizon::default(),
+            manners: BusTiming {
+                silence: Duration::from_millis(10),
+                patience: Duration::from_millis(100),
+                attempts: 3,
+            },
+            horizon: LateReplyWindow::default(),
         }
     }
 
@@ -84,8 +89,8 @@ impl Timing {
     #[must_use]
     pub fn brisk() -> Self {
         Self {
-            manners: Manners { silence: Duration::from_millis(2), patience: Duration::from_millis(30), attempts: 3 },
-            horizon: Horizon { late: Duration::from_millis(150), repeated: Duration::from_millis(60) },
+            manners: BusTiming { silence: Duration::from_millis(2), patience: Duration::from_millis(30), attempts: 3 },
+            horizon: LateReplyWindow { late: Duration::from_millis(150), repeated: Duration::from_millis(60) },
         }
     }
 
@@ -98,8 +103,8 @@ impl Timing {
     /// The project's own master on a link.
     #[must_use]
     pub fn master(&self, link: Link, work: &Workload) -> Bus {
-        let address = Address { device: "device", port: "bench".into(), baud: 115_200, format: "8N1".into() };
-        Bus::new(link, address, work.unit, self.manners).with_spans(work.spans).with_horizon(self.horizon)
+        let address = Address { device: DeviceKind::Servo, port: "bench".into(), baud: 115_200, format: "8N1".into() };
+        Bus::new(link, address, work.unit, self.manners).with_spans(work.spans).with_late_replies(self.horizon)
     }
 }
 

@@ -1,11 +1,11 @@
 //! A campaign: many runs by a plan, each with a log of its own, taken up again where it ended.
 //!
-//! `plan` (TOML, checked as a whole) → `schedule` (the order of the runs) → `estimate` (time and heat) → `conduct` (one log a run,
-//! through [`crate::run::attend`]) → `journal` (what is done, for the next start) → `report`.
+//! `plan` (TOML, checked as a whole) → `schedule` (the order of the runs) → `estimate` (time and heat) → `observer` (one log a run,
+//! through [`crate::run::run_job`]) → `journal` (what is done, for the next start) → `report`.
 
-pub mod conduct;
 pub mod estimate;
 pub mod journal;
+pub mod observer;
 pub mod plan;
 pub mod report;
 pub mod schedule;

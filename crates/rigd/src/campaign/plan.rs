@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use gearmodel::Direction;
 use serde::{Deserialize, Serialize};
 
 use super::CampaignError;
-use crate::profile::{Profile, SLOWEST_RPM};
-use crate::run::attend::Suspend;
+use crate::profile::Profile;
+use crate::run::admission::{Terms, admit_heat, admit_load, admit_speed};
 use crate::run::job::{Kind, RunSpec, Settle};
-use crate::run::limits::slip_power_w;
+use crate::run::run_job::Suspend;
+use crate::run::senses::Senses;
 
 /// Most runs of a plan, repeats included.
 const MOST_RUNS: usize = 10_000;
@@ -79,28 +79,6 @@ pub enum Order {
     AsWritten,
     /// Shuffled, so that what drifts with time is no effect of load or speed.
     Random,
-}
-
-/// A sense, or both.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Senses {
-    /// Counter-clockwise.
-    Ccw,
-    /// Clockwise.
-    Cw,
-    /// First ccw, then cw.
-    Both,
-}
-
-impl Senses {
-    fn list(self) -> Vec<Direction> {
-        match self {
-            Self::Ccw => vec![Direction::Ccw],
-            Self::Cw => vec![Direction::Cw],
-            Self::Both => vec![Direction::Ccw, Direction::Cw],
-        }
-    }
 }
 
 /// Turns under load before the first run.
@@ -348,31 +326,12 @@ impl Single {
 
 /// A run against the limits of the profile.
 fn check_run(name: &str, run: &RunSpec, profile: &Profile, faults: &mut Vec<String>) {
-    let (limits, rig) = (&profile.limits, &profile.name);
-    let (load, speed) = (run.load_nm, run.speed_rpm);
-    if !(speed >= SLOWEST_RPM && speed <= limits.speed_rpm) {
-        let limit = limits.speed_rpm;
-        faults.push(format!(
-            "{name}: speed_rpm = {speed} must be from {SLOWEST_RPM} to {limit} rpm (limits.speed_rpm in profile '{rig}')"
-        ));
-    }
-    if !(load >= 0.0 && load <= limits.load_nm) {
-        let limit = limits.load_nm;
-        faults.push(format!(
-            "{name}: load_nm = {load} must be from 0 to {limit} N·m (limits.load_nm in profile '{rig}')"
-        ));
-    } else if profile.brake.current_a(load).is_none() {
-        faults.push(format!(
-            "{name}: load_nm = {load} N·m is beyond the brake's calibrated curve or current limit in profile '{rig}'; lower the load, or calibrate further"
-        ));
-    }
-    let power_w = slip_power_w(load, speed);
-    if power_w > limits.slip_power_w {
-        faults.push(format!(
-            "{name}: {load} N·m at {speed} rpm make {power_w:.0} W of heat in the brake, over {} W (limits.slip_power_w in profile '{rig}'); lower load or speed",
-            limits.slip_power_w
-        ));
-    }
+    let refusals = [
+        admit_speed(profile, Terms::KEYS, run.speed_rpm),
+        admit_load(profile, Terms::KEYS, run.load_nm),
+        admit_heat(profile, Terms::KEYS, run.load_nm, run.speed_rpm),
+    ];
+    faults.extend(refusals.into_iter().filter_map(Result::err).map(|refusal| format!("{name}: {refusal}")));
     if run.kind != Kind::WarmUp && !(1.0..=f64::from(MOST_REVOLUTIONS)).contains(&run.revolutions) {
         faults.push(format!("{name}: revolutions = {} must be from 1 to {MOST_REVOLUTIONS}", run.revolutions));
     }
@@ -380,6 +339,8 @@ fn check_run(name: &str, run: &RunSpec, profile: &Profile, faults: &mut Vec<Stri
 
 #[cfg(test)]
 mod tests {
+    use gearmodel::Direction;
+
     use super::*;
 
     const NEXT: &str = "# record the other sense\n\n[[runs]]\ndirection = \"ccw\"\nload_nm = 5.0\nspeed_rpm = 5.0\nrevolutions = 4\n\n[[runs]]\ndirection = \"cw\"\nload_nm = 5.0\nspeed_rpm = 5.0\nrevolutions = 4\n";
@@ -450,6 +411,20 @@ mod tests {
         plan.check(&Profile::simulated(), Path::new("x")).expect("slow");
         assert!(faults(&at(0.0099)).contains("from 0.01 to 60 rpm"));
         assert!(faults(&at(1e-300)).contains("from 0.01"), "of which no time can be computed");
+    }
+
+    #[test]
+    fn load_and_speed_are_tried_from_both_sides() {
+        let at = |load: f64, rpm: f64| {
+            format!("[[runs]]\ndirection=\"cw\"\nload_nm={load:?}\nspeed_rpm={rpm:?}\nrevolutions=1")
+        };
+        for text in [at(20.0, 5.0), at(0.0, 5.0), at(5.0, 60.0)] {
+            let plan = CampaignPlan::parse(&text, Path::new("x")).expect("a plan");
+            plan.check(&Profile::simulated(), Path::new("x")).expect("just within");
+        }
+        assert!(faults(&at(20.01, 5.0)).contains("load_nm = 20.01 N·m is over the limit 20 N·m (limits.load_nm"));
+        assert!(faults(&at(-0.01, 5.0)).contains("load_nm = -0.01 N·m is no load"));
+        assert!(faults(&at(5.0, 60.01)).contains("speed_rpm = 60.01 rpm is over the limit 60 rpm (limits.speed_rpm"));
     }
 
     #[test]

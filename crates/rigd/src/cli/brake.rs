@@ -5,11 +5,11 @@ use std::cell::Cell;
 use riglog::RunMetadata;
 use serde_json::json;
 
-use super::set_up::{self, Common, Refusal, Task};
+use super::set_up::{self, Common, Task};
 use super::{Exit, fail};
-use crate::profile::Profile;
 use crate::quantity::TORQUE;
-use crate::run::rig::Rig;
+use crate::run::admission::{Terms, admit_load};
+use crate::run::connected_rig::ConnectedRig;
 use crate::run::session;
 use crate::run::set_up::hold_brake;
 
@@ -29,7 +29,7 @@ pub fn main(args: &Args) -> Exit {
         Ok(profile) => profile,
         Err(error) => return fail(Exit::BadInput, error.as_ref()),
     };
-    if let Err(refusal) = refuse(args.load, &profile) {
+    if let Err(refusal) = admit_load(&profile, Terms::SET_POINTS, args.load) {
         return fail(Exit::BadInput, &refusal);
     }
     let drag_nm = profile.brake.drag_nm();
@@ -45,26 +45,10 @@ pub fn main(args: &Args) -> Exit {
         figures: &|| json!({"load_nm": args.load, "heat_j": heat_j.get()}),
         words: &|| format!("{:.0} J above what the brake sheds are in its heat account", heat_j.get()),
     };
-    set_up::conduct(&args.common, profile, &task, async |rig: &mut Rig| {
-        let hold = async |rig: &mut Rig| hold_brake(rig, args.load, args.common.seconds).await;
+    set_up::execute(&args.common, profile, &task, async |rig: &mut ConnectedRig| {
+        let hold = async |rig: &mut ConnectedRig| hold_brake(rig, args.load, args.common.seconds).await;
         let outcome = session::once(rig, hold).await;
         heat_j.set(rig.heat.heat_j());
         outcome
     })
-}
-
-fn refuse(load_nm: f64, profile: &Profile) -> Result<(), Refusal> {
-    let limit = profile.limits.load_nm;
-    if load_nm > limit {
-        return Err(Refusal::OverLimit {
-            what: "load",
-            value: load_nm,
-            limit,
-            unit: "N·m",
-            key: "limits.load_nm",
-            advice: ", or raise the limit if the rig allows it",
-        });
-    }
-    let limit_a = profile.brake.current_limit_a;
-    if profile.brake.current_a(load_nm).is_none() { Err(Refusal::BeyondBrake { load_nm, limit_a }) } else { Ok(()) }
 }

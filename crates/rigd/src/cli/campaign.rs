@@ -9,22 +9,24 @@ use tokio::task::LocalSet;
 
 use super::run::TimeScale;
 use super::simulator::Simulator;
-use super::{Exit, fail, print, stop};
+use super::{Exit, fail, print};
 use crate::campaign::CampaignError;
-use crate::campaign::conduct::{Conductor, log_name, put_aside};
 use crate::campaign::estimate::{Estimate, estimate, time};
 use crate::campaign::journal::Journal;
+use crate::campaign::observer::{CampaignObserver, log_name, put_aside};
 use crate::campaign::plan::CampaignPlan;
 use crate::campaign::report::{Report, drift};
 use crate::campaign::schedule::Schedule;
 use crate::clock::Clock;
 use crate::profile::Profile;
-use crate::run::attend::Policy;
-use crate::run::halt::Halt;
 use crate::run::job::Job;
 use crate::run::keys::Keys;
-use crate::run::session::{self, Links, LogHead, Outcome, Work};
+use crate::run::progress::Progress;
+use crate::run::registry::Running;
+use crate::run::run_job::Policy;
+use crate::run::session::{self, JobSpec, Links, LogHead, Outcome, SessionContext};
 use crate::run::stop::StopRequests;
+use crate::run::stop_reason::StopReason;
 use crate::simulated::{self, PlantSpec};
 use riglog::pair;
 
@@ -117,7 +119,7 @@ pub fn main(args: &Args) -> Exit {
     if let Err(exit) = clear_away(&directory, &journal) {
         return exit;
     }
-    let running = stop::Running::register();
+    let running = Running::register();
     let exit = execute(args, prepared, &directory, journal);
     drop(running);
     exit
@@ -241,7 +243,7 @@ fn execute(args: &Args, prepared: Prepared, directory: &Path, journal: Journal) 
     let seed = args.seed.unwrap_or(1);
     let last_ns = journal.finished.iter().map(|run| run.ended_ns).max().unwrap_or(0);
     let planned = schedule.runs.len();
-    let outcome: Result<(Outcome, Conductor), String> = LocalSet::new().block_on(&runtime, async {
+    let outcome: Result<(Outcome, CampaignObserver), String> = LocalSet::new().block_on(&runtime, async {
         let stop = StopRequests::listen().map_err(|error| format!("signals: {error}"))?;
         stop.listen_for_pause().map_err(|error| format!("signals: {error}"))?;
         let _keys = Keys::listen(&stop);
@@ -268,32 +270,33 @@ fn execute(args: &Args, prepared: Prepared, directory: &Path, journal: Journal) 
         };
         let quiet = args.quiet || args.json;
         let parts = (schedule, indices, found);
-        let mut conductor = Conductor::new((directory, journal), profile.clone(), head, clock, parts, quiet);
-        let recorder = conductor.begin().map_err(|error| error.to_string())?;
+        let mut observer = CampaignObserver::new((directory, journal), profile.clone(), head, clock, parts, quiet);
+        let recorder = observer.begin().map_err(|error| error.to_string())?;
         let mut job = Job::new(runs, plan.rate_hz, 0);
         (job.settle, job.accept_no_watchdog) = (plan.settle(), args.accept_no_watchdog);
         let policy = Policy { reconnect_s: plan.reconnect_s, suspend: plan.suspend() };
-        let work = Work { profile, model, job, policy, quiet: args.quiet };
-        let mut outcome = session::conduct(work, recorder, &mut conductor, links, clock, stop).await;
-        if let Err(error) = conductor.conclude(outcome.finalised, outcome.halt.as_ref()) {
-            outcome.halt.get_or_insert(Halt::Journal(error));
+        let progress = Progress::new(job.revolutions(), args.quiet);
+        let context = SessionContext { profile, model, recorder, progress, links, clock, stop };
+        let mut outcome = session::execute_job(context, JobSpec { job, policy }, &mut observer).await;
+        if let Err(error) = observer.conclude(outcome.finalised, outcome.stop_reason.as_ref()) {
+            outcome.stop_reason.get_or_insert(StopReason::Journal(error));
         }
         drop(simulator);
-        Ok((outcome, conductor))
+        Ok((outcome, observer))
     });
     match outcome {
         Err(error) => {
             eprintln!("error: {error}");
             Exit::Failed
         }
-        Ok((outcome, conductor)) => {
+        Ok((outcome, observer)) => {
             for trouble in &outcome.troubles {
                 eprintln!("error: {trouble}");
             }
-            let finished = conductor.all_finished();
-            let interruptions = conductor.interruptions.clone();
-            let report = report(&plan, directory, planned, finished, interruptions, outcome.halt.as_ref());
-            conclude(args, &report, outcome.halt.as_ref())
+            let finished = observer.all_finished();
+            let interruptions = observer.interruptions.clone();
+            let report = report(&plan, directory, planned, finished, interruptions, outcome.stop_reason.as_ref());
+            conclude(args, &report, outcome.stop_reason.as_ref())
         }
     }
 }
@@ -316,7 +319,7 @@ fn report(
     planned: usize,
     finished: &[crate::campaign::journal::FinishedRun],
     interruptions: Vec<String>,
-    halt: Option<&Halt>,
+    reason: Option<&StopReason>,
 ) -> Report {
     // A warm-up that was done again counts once.
     let mut runs: Vec<_> = finished.to_vec();
@@ -331,11 +334,11 @@ fn report(
         drift: drift(&runs),
         runs,
         interruptions,
-        ended: halt.map_or_else(|| "done".into(), ToString::to_string),
+        ended: reason.map_or_else(|| "done".into(), ToString::to_string),
     }
 }
 
-fn conclude(args: &Args, report: &Report, halt: Option<&Halt>) -> Exit {
+fn conclude(args: &Args, report: &Report, reason: Option<&StopReason>) -> Exit {
     if args.json {
         match serde_json::to_string_pretty(report) {
             Ok(json) => print(&json),
@@ -344,13 +347,13 @@ fn conclude(args: &Args, report: &Report, halt: Option<&Halt>) -> Exit {
     } else {
         print(report.text().trim_start_matches('\n'));
     }
-    match halt {
-        Some(halt @ Halt::Operator) => {
-            eprintln!("{halt}; the same command goes on at the first unfinished run");
+    match reason {
+        Some(reason @ StopReason::Operator) => {
+            eprintln!("{reason}; the same command goes on at the first unfinished run");
             Exit::Stopped
         }
-        Some(halt) => {
-            let exit = fail(Exit::Halted, halt);
+        Some(reason) => {
+            let exit = fail(Exit::Halted, reason);
             eprintln!("the logs are finalised; the same command goes on at the first unfinished run");
             exit
         }

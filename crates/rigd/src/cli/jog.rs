@@ -9,9 +9,9 @@ use serde_json::json;
 
 use super::set_up::{self, Common, Refusal, Task};
 use super::{Exit, fail};
-use crate::profile::SLOWEST_RPM;
 use crate::quantity::SPEED;
-use crate::run::rig::Rig;
+use crate::run::admission::{Terms, admit_speed};
+use crate::run::connected_rig::ConnectedRig;
 use crate::run::session;
 use crate::run::set_up::{Jog, LARGEST_RPM, jog};
 
@@ -58,17 +58,11 @@ pub fn main(args: &Args) -> Exit {
         Ok(profile) => profile,
         Err(error) => return fail(Exit::BadInput, error.as_ref()),
     };
-    for (limit, key, advice) in [
-        (LARGEST_RPM, "of set-up", ", or use rigd run"),
-        (profile.limits.speed_rpm, "limits.speed_rpm", ", or raise the limit if the rig allows it"),
-    ] {
-        if args.rpm > limit {
-            let refusal = Refusal::OverLimit { what: "--rpm", value: args.rpm, limit, unit: "rpm", key, advice };
-            return fail(Exit::BadInput, &refusal);
-        }
+    if args.rpm > LARGEST_RPM {
+        return fail(Exit::BadInput, &Refusal::TooFast { speed_rpm: args.rpm });
     }
-    if args.rpm < SLOWEST_RPM {
-        return fail(Exit::BadInput, &Refusal::TooSlow { speed_rpm: args.rpm });
+    if let Err(refusal) = admit_speed(&profile, Terms::OPTIONS, args.rpm) {
+        return fail(Exit::BadInput, &refusal);
     }
     let direction = if args.direction == Sense::Ccw { Direction::Ccw } else { Direction::Cw };
     let plan = Jog {
@@ -104,8 +98,8 @@ pub fn main(args: &Args) -> Exit {
         figures: &|| json!({"direction": direction.to_string(), "speed_rpm": args.rpm, "turned_rad": turned().map(|turns| turns * TAU)}),
         words: &words,
     };
-    set_up::conduct(&args.common, profile, &task, async |rig: &mut Rig| {
-        let outcome = session::once(rig, async |rig: &mut Rig| jog(rig, plan, &from_rad).await).await;
+    set_up::execute(&args.common, profile, &task, async |rig: &mut ConnectedRig| {
+        let outcome = session::once(rig, async |rig: &mut ConnectedRig| jog(rig, plan, &from_rad).await).await;
         to_rad.set(rig.acquisition.borrow().latest.theta1_rad);
         outcome
     })

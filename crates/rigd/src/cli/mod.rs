@@ -7,7 +7,6 @@ mod brake;
 mod calibrate;
 mod campaign;
 mod diagnose;
-mod directions;
 mod doctor;
 mod export;
 mod import;
@@ -25,7 +24,7 @@ mod serve;
 mod set_up;
 mod sim;
 mod simulator;
-pub mod stop;
+mod stop;
 mod verify;
 mod withhold;
 

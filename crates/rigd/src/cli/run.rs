@@ -5,18 +5,21 @@ use std::path::{Path, PathBuf};
 use riglog::LogError;
 use tokio::task::LocalSet;
 
-use super::directions::Directions;
 use super::simulator::Simulator;
-use super::{Exit, fail, print, stop};
+use super::{Exit, fail, print};
 use crate::clock::Clock;
 use crate::plot;
-use crate::profile::{Profile, SLOWEST_RPM};
+use crate::profile::Profile;
 use crate::quantity::{RATE, SPEED, TORQUE};
-use crate::run::Plan;
-use crate::run::attend::Policy;
+use crate::run::admission::{Terms, admit};
+use crate::run::job::Job;
 use crate::run::keys::Keys;
-use crate::run::rig::slip_power_w;
-use crate::run::session::{self, Links, Outcome, Setup};
+use crate::run::observer::NoObserver;
+use crate::run::plan::RunPlan;
+use crate::run::registry::Running;
+use crate::run::run_job::Policy;
+use crate::run::senses::Senses;
+use crate::run::session::{self, JobSpec, Links, LogHead, Outcome, RunConfig};
 use crate::run::stop::StopRequests;
 use crate::simulated::{self, PlantSpec};
 use crate::summary::{Origin, Summary};
@@ -36,7 +39,7 @@ pub struct Args {
     rpm: f64,
     /// Senses of rotation, in this order
     #[arg(long, value_enum, default_value = "both")]
-    direction: Directions,
+    direction: Senses,
     /// Whole revolutions of the driver to record in each sense
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     revs: u32,
@@ -114,20 +117,6 @@ pub enum TimeScale {
 /// What is refused before anything is opened, moved or written.
 #[derive(Debug, thiserror::Error)]
 enum Refusal {
-    #[error(
-        "{option} {value} {unit} is over the limit {limit} {unit} ({key} in profile '{profile}'); lower it, or raise the limit if the rig allows it"
-    )]
-    OverLimit { option: &'static str, value: f64, unit: &'static str, limit: f64, key: &'static str, profile: String },
-    #[error(
-        "--load {load_nm} N·m is beyond the brake's calibrated curve or its current limit {limit_a} A (brake.rising, brake.current_limit_a in profile '{profile}'); lower the load, or calibrate further"
-    )]
-    BeyondBrake { load_nm: f64, limit_a: f64, profile: String },
-    #[error(
-        "--load {load_nm} N·m at --rpm {speed_rpm} makes {power_w:.0} W of heat in the brake, over its {limit_w} W (limits.slip_power_w in profile '{profile}'); lower load or speed"
-    )]
-    TooHot { load_nm: f64, speed_rpm: f64, power_w: f64, limit_w: f64, profile: String },
-    #[error("--rpm {speed_rpm} is too slow: a revolution would take hours; use {SLOWEST_RPM} rpm or more")]
-    TooSlow { speed_rpm: f64 },
     #[error("--rate {rate_hz} Hz does not fit the clock of a counter: use 10 Hz to 1 MHz")]
     Rate { rate_hz: f64 },
     #[error("--undocumented '{name}' is not an effect of the simulated rig; it has: {known}")]
@@ -142,13 +131,21 @@ enum Refusal {
     MixedPorts { profile: String },
 }
 
+/// What was read and checked before anything moves.
+struct Prepared {
+    config: RunConfig,
+    plan: RunPlan,
+    /// The simulated rig, where that is the rig.
+    spec: Option<PlantSpec>,
+}
+
 /// Runs the command.
 pub fn main(args: &Args) -> Exit {
     if args.undocumented.iter().any(|name| name == "list") {
         print(&simulated::describe_undocumented());
         return Exit::Done;
     }
-    let (setup, spec) = match prepare(args) {
+    let prepared = match prepare(args) {
         Ok(prepared) => prepared,
         Err(error) => return fail(Exit::BadInput, error.as_ref()),
     };
@@ -158,15 +155,15 @@ pub fn main(args: &Args) -> Exit {
     }
     recover(&args.out);
     if !args.json {
-        announce(args, &setup);
+        announce(args, &prepared);
     }
-    let running = stop::Running::register();
-    let exit = execute(args, setup, spec);
+    let running = Running::register();
+    let exit = execute(args, prepared);
     drop(running);
     exit
 }
 
-fn prepare(args: &Args) -> Result<(Setup, Option<PlantSpec>), Box<dyn std::error::Error>> {
+fn prepare(args: &Args) -> Result<Prepared, Box<dyn std::error::Error>> {
     let mut profile = match &args.profile {
         Some(path) => Profile::load(path)?,
         None => Profile::simulated(),
@@ -176,7 +173,7 @@ fn prepare(args: &Args) -> Result<(Setup, Option<PlantSpec>), Box<dyn std::error
     }
     session::check_drivers(&profile)?;
     let (pair_toml, model) = pair::load(args.model.as_deref().or(args.pair.as_deref()))?;
-    let plan = Plan {
+    let plan = RunPlan {
         directions: args.direction.list(),
         loads_nm: args.load.0.clone(),
         speed_rpm: args.rpm,
@@ -214,18 +211,15 @@ fn prepare(args: &Args) -> Result<(Setup, Option<PlantSpec>), Box<dyn std::error
     } else {
         None
     };
-    let setup = Setup {
+    let config = RunConfig {
         path: session::log_path(&args.out, &plan),
-        plan,
         profile,
         model,
-        pair_toml,
-        operator: args.operator.clone(),
-        note: args.note.clone(),
+        head: LogHead { operator: args.operator.clone(), note: args.note.clone(), pair_toml, plan_toml: None },
+        conditions: plan.conditions(),
         quiet: args.quiet,
-        policy: Policy { reconnect_s: args.reconnect, suspend: None },
     };
-    Ok((setup, spec))
+    Ok(Prepared { config, plan, spec })
 }
 
 /// Refuses a model of other gears than the simulated rig has.
@@ -240,41 +234,12 @@ fn same_gears(args: &Args, plant_toml: &str, model_toml: &str) -> Result<(), Ref
     }
 }
 
-fn refuse(profile: &Profile, plan: &Plan) -> Result<(), Refusal> {
-    let (limits, name) = (&profile.limits, &profile.name);
-    let over = |option, value: f64, unit, limit: f64, key| {
-        if value <= limit {
-            Ok(())
-        } else {
-            Err(Refusal::OverLimit { option, value, unit, limit, key, profile: name.clone() })
-        }
-    };
-    over("--rpm", plan.speed_rpm, "rpm", limits.speed_rpm, "limits.speed_rpm")?;
-    if plan.speed_rpm < SLOWEST_RPM {
-        return Err(Refusal::TooSlow { speed_rpm: plan.speed_rpm });
-    }
+fn refuse(profile: &Profile, plan: &RunPlan) -> Result<(), Box<dyn std::error::Error>> {
     for &load_nm in &plan.loads_nm {
-        over("--load", load_nm, "N·m", limits.load_nm, "limits.load_nm")?;
-        if profile.brake.current_a(load_nm).is_none() {
-            return Err(Refusal::BeyondBrake {
-                load_nm,
-                limit_a: profile.brake.current_limit_a,
-                profile: name.clone(),
-            });
-        }
-        let power_w = slip_power_w(load_nm, plan.speed_rpm);
-        if power_w > limits.slip_power_w {
-            return Err(Refusal::TooHot {
-                load_nm,
-                speed_rpm: plan.speed_rpm,
-                power_w,
-                limit_w: limits.slip_power_w,
-                profile: name.clone(),
-            });
-        }
+        admit(profile, Terms::OPTIONS, load_nm, plan.speed_rpm)?;
     }
     if !(10.0..=1e6).contains(&plan.rate_hz) {
-        return Err(Refusal::Rate { rate_hz: plan.rate_hz });
+        return Err(Box::new(Refusal::Rate { rate_hz: plan.rate_hz }));
     }
     Ok(())
 }
@@ -302,56 +267,61 @@ pub fn recover(directory: &Path) {
     }
 }
 
-fn announce(args: &Args, setup: &Setup) {
-    let profile = &setup.profile;
+fn announce(args: &Args, prepared: &Prepared) {
+    let profile = &prepared.config.profile;
     if profile.name == "sim" {
         let how = if args.time_scale == Some(TimeScale::Real) { "in real time" } else { "faster than real time" };
         print(&format!("SIMULATED RIG, {how} (no --profile given): real registers and frames, emulated hardware"));
     } else {
         print(&format!("rig '{}'", profile.name));
     }
-    for warning in warnings(setup) {
+    for warning in warnings(prepared) {
         eprintln!("warning: {warning}");
     }
 }
 
 /// What one should know before believing the numbers.
-fn warnings(setup: &Setup) -> Vec<String> {
+fn warnings(prepared: &Prepared) -> Vec<String> {
+    let Prepared { config: RunConfig { profile, model, .. }, plan, .. } = prepared;
     let mut warnings = Vec::new();
-    let slip = setup.plan.speed_rpm * setup.profile.brake.step_up;
+    let slip = plan.speed_rpm * profile.brake.step_up;
     if slip < STICK_SLIP_RPM {
         warnings.push(format!(
             "the brake slips at {slip} rpm; makers recommend {STICK_SLIP_RPM} rpm or more, below it the torque sticks and slips (a step-up before the brake, brake.step_up, helps)"
         ));
     }
-    if setup.profile.in_process() && !setup.model.effects.is_empty() {
-        let names: Vec<&str> = setup.model.effects.terms().iter().map(|term| term.effect.name()).collect();
+    if profile.in_process() && !model.effects.is_empty() {
+        let names: Vec<&str> = model.effects.terms().iter().map(|term| term.effect.name()).collect();
         warnings.push(format!(
             "the model has {}: the simulated rig has them only where --undocumented puts them there",
             names.join(", ")
         ));
     }
-    let drag = setup.profile.brake.drag_nm();
-    for load in setup.plan.loads_nm.iter().filter(|load| **load < drag) {
+    let drag = profile.brake.drag_nm();
+    for load in plan.loads_nm.iter().filter(|load| **load < drag) {
         warnings.push(format!("load {load} N·m is below the brake's drag of {drag} N·m; the drag remains"));
     }
     warnings
 }
 
-fn execute(args: &Args, setup: Setup, spec: Option<PlantSpec>) -> Exit {
+fn execute(args: &Args, prepared: Prepared) -> Exit {
     let seed = args.seed.unwrap_or(1);
-    match spec {
-        None => in_runtime(args, setup, Time::Real, |_| Ok((Links::default(), None))),
-        Some(_) if args.time_scale == Some(TimeScale::Real) => in_runtime(args, setup, Time::Real, |setup| {
+    match &prepared.spec {
+        None => in_runtime(args, prepared, Time::Real, |_| Ok((Links::default(), None))),
+        Some(_) if args.time_scale == Some(TimeScale::Real) => in_runtime(args, prepared, Time::Real, |prepared| {
             let simulator = Simulator::start(seed, args.pair.as_deref(), &args.undocumented)?;
-            setup.profile = Profile { name: setup.profile.name.clone(), ..simulator.profile().clone() };
+            let profile = &mut prepared.config.profile;
+            *profile = Profile { name: profile.name.clone(), ..simulator.profile().clone() };
             Ok((Links::default(), Some(simulator)))
         }),
-        Some(spec) => in_runtime(args, setup, Time::Simulated, |setup| {
-            let links =
-                simulated::start_in_process(&spec, setup.plan.rate_hz, seed).map_err(|error| error.to_string())?;
-            Ok((links, None))
-        }),
+        Some(spec) => {
+            let spec = spec.clone();
+            in_runtime(args, prepared, Time::Simulated, move |prepared| {
+                let rate_hz = prepared.plan.rate_hz;
+                let links = simulated::start_in_process(&spec, rate_hz, seed).map_err(|error| error.to_string())?;
+                Ok((links, None))
+            })
+        }
     }
 }
 
@@ -366,9 +336,9 @@ enum Time {
 /// Runs a session once `connect` has made the links; signals are heard before it, so that none is missed.
 fn in_runtime(
     args: &Args,
-    mut setup: Setup,
+    mut prepared: Prepared,
     time: Time,
-    connect: impl FnOnce(&mut Setup) -> Result<(Links, Option<Simulator>), String>,
+    connect: impl FnOnce(&mut Prepared) -> Result<(Links, Option<Simulator>), String>,
 ) -> Exit {
     let simulated = time == Time::Simulated;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(simulated).build();
@@ -376,16 +346,20 @@ fn in_runtime(
         Ok(runtime) => runtime,
         Err(error) => return fail(Exit::Failed, &error),
     };
-    let path = setup.path.clone();
-    let backend = setup.profile.name.clone();
-    let warnings = warnings(&setup);
+    let path = prepared.config.path.clone();
+    let backend = prepared.config.profile.name.clone();
+    let warnings = warnings(&prepared);
     let outcome = LocalSet::new().block_on(&runtime, async move {
         let stop = StopRequests::listen().map_err(|error| format!("signals: {error}"))?;
         stop.listen_for_pause().map_err(|error| format!("signals: {error}"))?;
         let _keys = Keys::listen(&stop);
-        let (links, _simulator) = connect(&mut setup)?;
+        let (links, _simulator) = connect(&mut prepared)?;
         let clock = if simulated { Clock::simulated() } else { Clock::real() };
-        session::run(setup, links, clock, stop).await.map_err(|error| error.to_string())
+        let job = Job::of(&prepared.plan);
+        let policy = Policy { reconnect_s: args.reconnect, suspend: None };
+        let context =
+            prepared.config.begin(job.revolutions(), links, clock, stop).map_err(|error| error.to_string())?;
+        Ok::<_, String>(session::execute_job(context, JobSpec { job, policy }, &mut NoObserver).await)
     });
     match outcome {
         Err(error) => {
@@ -398,13 +372,13 @@ fn in_runtime(
 
 /// Summary, picture and exit code.
 fn conclude(args: &Args, path: &Path, backend: String, warnings: Vec<String>, outcome: &Outcome) -> Exit {
-    use crate::run::halt::Halt;
+    use crate::run::stop_reason::StopReason;
     let origin = Origin {
         schema: "rigd.run/1",
         log: vec![path.display().to_string()],
         backend,
         losses: outcome.lost + outcome.unwritten,
-        ended: outcome.halt.as_ref().map_or_else(|| "done".into(), ToString::to_string),
+        ended: outcome.stop_reason.as_ref().map_or_else(|| "done".into(), ToString::to_string),
         warnings: warnings.into_iter().chain(outcome.troubles.iter().cloned()).collect(),
     };
     let mut summary = Summary::of(&outcome.analysis, origin);
@@ -427,7 +401,7 @@ fn conclude(args: &Args, path: &Path, backend: String, warnings: Vec<String>, ou
     for trouble in &outcome.troubles {
         eprintln!("error: {trouble}");
     }
-    match &outcome.halt {
+    match &outcome.stop_reason {
         None if summary.losses > 0 => {
             eprintln!(
                 "error: {} samples never arrived or were not written; see /rig/events in the log",
@@ -437,10 +411,10 @@ fn conclude(args: &Args, path: &Path, backend: String, warnings: Vec<String>, ou
         }
         None if !outcome.troubles.is_empty() => Exit::Halted,
         None => Exit::Done,
-        Some(halt @ Halt::Operator) => {
-            eprintln!("{halt}; the log is finalised: {}", path.display());
+        Some(reason @ StopReason::Operator) => {
+            eprintln!("{reason}; the log is finalised: {}", path.display());
             Exit::Stopped
         }
-        Some(halt) => fail(Exit::Halted, halt),
+        Some(reason) => fail(Exit::Halted, reason),
     }
 }

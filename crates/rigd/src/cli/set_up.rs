@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use riglog::RunMetadata;
 use serde_json::{Value, json};
 
-use super::on_rig::{OnRig, on_rig};
+use super::on_rig::on_rig;
 use super::run::seconds;
-use super::{Exit, fail, print, stop};
-use crate::profile::{Profile, SLOWEST_RPM};
-use crate::run::halt::Halt;
-use crate::run::rig::Rig;
-use crate::run::session::{self, LogHead, Outcome};
-use crate::run::set_up::RATE_HZ;
+use super::{Exit, fail, print};
+use crate::profile::Profile;
+use crate::run::connected_rig::ConnectedRig;
+use crate::run::registry::Running;
+use crate::run::session::{self, LogHead, Outcome, RunConfig};
+use crate::run::set_up::{LARGEST_RPM, RATE_HZ};
+use crate::run::stop_reason::StopReason;
 use riglog::pair;
 
 /// Options of both.
@@ -47,37 +48,11 @@ pub enum Refusal {
     /// The shaft turns only with consent.
     #[error("the shaft turns only with consent: clear the rig, keep hands off it, and say --turn")]
     NoConsent,
-    /// Nothing would be seen to turn.
-    #[error("--rpm {speed_rpm} is too slow; use {SLOWEST_RPM} rpm or more")]
-    TooSlow {
-        /// What was asked for, rpm.
+    /// Faster than is safe beside open teeth.
+    #[error("--rpm {speed_rpm} rpm is over the limit {LARGEST_RPM} rpm (of set-up); lower it, or use rigd run")]
+    TooFast {
+        /// What was asked for, rpm of the driver.
         speed_rpm: f64,
-    },
-    /// A value over its limit.
-    #[error("{what} {value} {unit} is over the limit {limit} {unit} ({key}); lower it{advice}")]
-    OverLimit {
-        /// Which value.
-        what: &'static str,
-        /// How much was asked for.
-        value: f64,
-        /// The limit.
-        limit: f64,
-        /// Unit of both.
-        unit: &'static str,
-        /// Where the limit comes from.
-        key: &'static str,
-        /// What else may be done.
-        advice: &'static str,
-    },
-    /// The curve ends before it.
-    #[error(
-        "{load_nm} N·m is beyond the brake's calibrated curve or its current limit {limit_a} A (brake.rising, brake.current_limit_a); lower it, or calibrate further"
-    )]
-    BeyondBrake {
-        /// What was asked for, N·m.
-        load_nm: f64,
-        /// The coil's limit, A.
-        limit_a: f64,
     },
 }
 
@@ -111,11 +86,11 @@ pub fn load(common: &Common) -> Result<Profile, Box<dyn std::error::Error>> {
 }
 
 /// Does it, and says how it ended.
-pub fn conduct(
+pub fn execute(
     common: &Common,
     profile: Profile,
     task: &Task<'_>,
-    body: impl AsyncFnOnce(&mut Rig) -> (Option<Halt>, Vec<String>),
+    body: impl AsyncFnOnce(&mut ConnectedRig) -> (Option<StopReason>, Vec<String>),
 ) -> Exit {
     let (pair_toml, model) = match pair::load(None) {
         Ok(pair) => pair,
@@ -134,18 +109,16 @@ pub fn conduct(
     }
     let path = session::free_path(&common.logs, &task.name);
     let head = LogHead { operator: common.operator.clone(), note: task.name.clone(), pair_toml, plan_toml: None };
-    let work = OnRig {
+    let config = RunConfig {
         path: path.clone(),
         profile,
         model,
         head,
         conditions: task.conditions.clone(),
-        seed: common.seed,
-        rate_hz: RATE_HZ,
         quiet: common.quiet || common.json,
     };
-    let running = stop::Running::register();
-    let outcome = on_rig(work, body);
+    let running = Running::register();
+    let outcome = on_rig(config, common.seed, RATE_HZ, body);
     drop(running);
     match outcome {
         Ok(outcome) => conclude(common, task, &path, &outcome),
@@ -157,7 +130,7 @@ pub fn conduct(
 }
 
 fn conclude(common: &Common, task: &Task<'_>, path: &std::path::Path, outcome: &Outcome) -> Exit {
-    let ended = outcome.halt.as_ref().map_or_else(|| "done".into(), ToString::to_string);
+    let ended = outcome.stop_reason.as_ref().map_or_else(|| "done".into(), ToString::to_string);
     if common.json {
         let mut answer = json!({
             "schema": task.schema, "log": path.display().to_string(), "ended": ended, "troubles": outcome.troubles,
@@ -172,13 +145,13 @@ fn conclude(common: &Common, task: &Task<'_>, path: &std::path::Path, outcome: &
     for trouble in &outcome.troubles {
         eprintln!("error: {trouble}");
     }
-    match &outcome.halt {
+    match &outcome.stop_reason {
         None if outcome.troubles.is_empty() => Exit::Done,
         None => Exit::Halted,
-        Some(halt @ Halt::Operator) => {
-            eprintln!("{halt}; the motor is off, the brake at zero");
+        Some(reason @ StopReason::Operator) => {
+            eprintln!("{reason}; the motor is off, the brake at zero");
             Exit::Stopped
         }
-        Some(halt) => fail(Exit::Halted, halt),
+        Some(reason) => fail(Exit::Halted, reason),
     }
 }

@@ -6,11 +6,10 @@ use std::time::Duration;
 use async_trait::async_trait;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::time::{Instant, timeout_at};
-use wire::counter_box::{
-    AckStatus, Command, Encoder, Frame, MAX_SAMPLES_PER_FRAME, PROTOCOL_VERSION, Samples, StreamDecoder,
-};
+use wire::Samples;
+use wire::counter_box::{AckStatus, Command, Encoder, Frame, MAX_SAMPLES_PER_FRAME, PROTOCOL_VERSION, StreamDecoder};
 
-use super::{Counter, CounterIdentity, DeviceError, Zero};
+use super::{Counter, CounterIdentity, DeviceError, DeviceKind, Zero};
 use crate::link::{Address, Link};
 use crate::profile::CounterProfile;
 
@@ -134,7 +133,7 @@ impl Counter for CounterBox {
             .await?;
         if identity.protocol_version != PROTOCOL_VERSION {
             return Err(DeviceError::Unexpected {
-                device: "counter",
+                device: DeviceKind::Counter,
                 port: self.port.clone(),
                 found: format!("protocol version {}", identity.protocol_version),
                 expected: format!("version {PROTOCOL_VERSION}"),

@@ -11,7 +11,7 @@ use tokio::time::{Instant, timeout, timeout_at};
 use wire::dsp7000::{Command, Dsp7000Error, FULL_SCALE_A, MAX_PERCENT, Reading, Status};
 
 use super::bus::BusStatistics;
-use super::{Brake, BrakeStatus, DeviceError, Identity};
+use super::{Brake, BrakeStatus, DeviceError, DeviceKind, Identity};
 use crate::link::{Address, Link};
 use crate::profile::BrakeProfile;
 
@@ -41,7 +41,7 @@ pub fn open(link: Link, address: Address, _: &BrakeProfile) -> Box<dyn Brake> {
 
 impl Dsp7000 {
     fn failed(&self, what: impl Into<String>) -> DeviceError {
-        DeviceError::Line { device: "brake", port: self.port.clone(), what: what.into() }
+        DeviceError::Line { device: DeviceKind::Brake, port: self.port.clone(), what: what.into() }
     }
 
     async fn send(&mut self, command: Command) -> Result<(), DeviceError> {
@@ -200,7 +200,7 @@ mod tests {
     }
 
     fn driver(link: Link) -> Box<dyn Brake> {
-        let address = Address { device: "brake", port: "x".into(), baud: 19_200, format: "8N1".into() };
+        let address = Address { device: DeviceKind::Brake, port: "x".into(), baud: 19_200, format: "8N1".into() };
         open(link, address, &crate::profile::Profile::simulated().brake)
     }
 

@@ -3,8 +3,8 @@
 use async_trait::async_trait;
 
 use super::bus::BusStatistics;
+use super::lost_device::LostDevice;
 use super::map::{BrakeRules, Map, Mapped};
-use super::stand_in::StandIn;
 use super::{Brake, BrakeStatus, DeviceError, DeviceKind, Identity};
 use crate::link::{Address, Link};
 use crate::profile::BrakeProfile;
@@ -19,12 +19,12 @@ struct MappedBrake {
 pub fn open(link: Link, address: Address, profile: &BrakeProfile) -> Box<dyn Brake> {
     match Map::of_brake(profile) {
         Ok((map, rules)) => {
-            let bus = map.bus(link, address, profile.unit, profile.horizon());
+            let bus = map.bus(link, address, profile.unit, profile.late_replies());
             // The first model, whose currents are the smallest, until the device has said which it is.
             let model = map.models.first().cloned();
             Box::new(MappedBrake { device: Mapped { bus, map, model }, rules })
         }
-        Err(reason) => Box::new(StandIn::unmapped(DeviceKind::Brake, reason)),
+        Err(reason) => Box::new(LostDevice::unmapped(DeviceKind::Brake, reason)),
     }
 }
 
@@ -38,7 +38,7 @@ impl MappedBrake {
         let Some(model) = found.cloned() else {
             let known: Vec<String> = models.iter().map(|model| format!("{} {:?}", model.name, model.ids)).collect();
             return Err(DeviceError::Unexpected {
-                device: "brake",
+                device: DeviceKind::Brake,
                 port: self.device.bus.port().to_owned(),
                 found: format!("model {id}, whose scales are unknown"),
                 expected: format!("one of {}", known.join(", ")),

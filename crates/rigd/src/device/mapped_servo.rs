@@ -5,8 +5,8 @@ use std::time::Duration;
 use async_trait::async_trait;
 
 use super::bus::{BusError, BusStatistics};
+use super::lost_device::LostDevice;
 use super::map::{Map, Mapped, ServoRules, Step};
-use super::stand_in::StandIn;
 use super::{DeviceError, DeviceKind, Identity, Servo, ServoStatus};
 use crate::link::{Address, Link};
 use crate::profile::ServoProfile;
@@ -25,10 +25,10 @@ struct MappedServo {
 pub fn open(link: Link, address: Address, profile: &ServoProfile) -> Box<dyn Servo> {
     match Map::of_servo(profile) {
         Ok((map, rules)) => {
-            let bus = map.bus(link, address, profile.unit, profile.horizon());
+            let bus = map.bus(link, address, profile.unit, profile.late_replies());
             Box::new(MappedServo { name: map.title.clone(), device: Mapped { bus, map, model: None }, rules })
         }
-        Err(reason) => Box::new(StandIn::unmapped(DeviceKind::Servo, reason)),
+        Err(reason) => Box::new(LostDevice::unmapped(DeviceKind::Servo, reason)),
     }
 }
 
@@ -110,7 +110,7 @@ impl Servo for MappedServo {
             let value = self.device.get(&test.register).await?;
             if !test.holds(value) {
                 return Err(DeviceError::Unexpected {
-                    device: "servo",
+                    device: DeviceKind::Servo,
                     port: self.port(),
                     found: format!("{} = {value}", test.register),
                     expected: test.advice,
@@ -146,7 +146,7 @@ impl Servo for MappedServo {
             }
             if tokio::time::Instant::now() > patience {
                 return Err(DeviceError::NotReached {
-                    device: "servo",
+                    device: DeviceKind::Servo,
                     port: self.port(),
                     state: if enabled { "servo on" } else { "servo off" },
                     seconds: self.rules.enable_s,

@@ -1,25 +1,24 @@
-//! Devices by what they do. One device is one file and one line in its list.
+//! Devices by what they do. One device is one file and one line in its list, [`drivers`].
 
 pub mod bus;
 pub mod counter_box;
+pub mod drivers;
 pub mod dsp7000;
+pub mod lost_device;
 pub mod map;
 pub mod mapped_brake;
 pub mod mapped_servo;
 pub mod qsb;
 pub mod qsb_reader;
 pub mod refused;
-pub mod stand_in;
 pub mod two_clocks;
 
 use std::time::Duration;
 
 use async_trait::async_trait;
 use thiserror::Error;
-use wire::counter_box::Samples;
+use wire::Samples;
 
-use crate::link::{Address, Link};
-use crate::profile::{BrakeProfile, CounterProfile, ServoProfile};
 pub use bus::BusError;
 pub use wire::DeviceKind;
 
@@ -104,7 +103,7 @@ pub enum DeviceError {
     #[error("{device} on {port}: {found} where the profile says {expected}; check the port and the profile's driver")]
     Unexpected {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// What it says it is.
@@ -118,7 +117,7 @@ pub enum DeviceError {
     )]
     Range {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// Quantity.
@@ -134,7 +133,7 @@ pub enum DeviceError {
     #[error("{device} on {port} did not reach '{state}' within {seconds} s; last status: {status}")]
     NotReached {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// The state that was asked for.
@@ -148,7 +147,7 @@ pub enum DeviceError {
     #[error("{device}: {reason}; `rigd profile check` shows every fault")]
     Map {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// What is wrong with the map.
         reason: String,
     },
@@ -156,7 +155,7 @@ pub enum DeviceError {
     #[error("{device} on {port}: {what}")]
     Line {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// What happened, and what to check.
@@ -265,43 +264,4 @@ pub trait Counter {
     fn clocks(&self) -> Option<Clocks> {
         None
     }
-}
-
-/// Drivers by their name in the profile: each is opened on its link.
-type Drivers<P, D> = &'static [(&'static str, fn(Link, Address, &P) -> Box<D>)];
-
-/// Driver's name of a device whose register map is a file of its own, named by `map`.
-pub const MAP: &str = "map";
-
-/// Servo drives by their name in the profile.
-pub const SERVOS: Drivers<ServoProfile, dyn Servo> =
-    &[("asda-b2", mapped_servo::open), ("dsy-rs", mapped_servo::open), (MAP, mapped_servo::open)];
-
-/// Brake drivers by their name in the profile.
-pub const BRAKES: Drivers<BrakeProfile, dyn Brake> =
-    &[("rd60xx", mapped_brake::open), ("dsp7000", dsp7000::open), (MAP, mapped_brake::open)];
-
-/// Encoder readers by their name in the profile.
-pub const COUNTERS: Drivers<CounterProfile, dyn Counter> =
-    &[("counter-box", counter_box::open), (qsb::DRIVER, qsb::open)];
-
-/// A driver's name that is in no list.
-#[derive(Debug, Error)]
-#[error("{device}: no driver '{name}'; this version has {known}")]
-pub struct UnknownDriver {
-    device: &'static str,
-    name: String,
-    known: String,
-}
-
-/// Finds a driver by its name in the profile.
-///
-/// # Errors
-/// [`UnknownDriver`] lists those that there are.
-pub fn find<F: Copy>(drivers: &[(&'static str, F)], device: &'static str, name: &str) -> Result<F, UnknownDriver> {
-    drivers.iter().find(|(known, _)| *known == name).map(|(_, factory)| *factory).ok_or_else(|| UnknownDriver {
-        device,
-        name: name.to_owned(),
-        known: drivers.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", "),
-    })
 }

@@ -8,16 +8,15 @@ use std::time::Duration;
 use async_trait::async_trait;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::time::{Instant, timeout_at};
-use wire::counter_box::{MAX_SAMPLES_PER_FRAME, Samples};
+use wire::Samples;
 use wire::qsb::{Answer, END_CR, END_LF, END_TIME, Instruction, Kind, register};
 
 use super::qsb_reader::{Jumped, Reader, TICK_NS, TICK_S};
 use super::two_clocks::{ClockFit, Skew};
-use super::{Clocks, Counter, CounterIdentity, DeviceError, Zero};
+use super::{Clocks, Counter, CounterIdentity, DeviceError, DeviceKind, Zero};
 use crate::link::{Address, Link};
-use crate::profile::CounterProfile;
 pub use crate::profile::qsb::DRIVER;
-use crate::profile::qsb::QsbProfile;
+use crate::profile::{CounterProfile, QsbProfile};
 
 /// How long a reader may take to answer.
 const PATIENCE: Duration = Duration::from_millis(300);
@@ -31,6 +30,8 @@ const LONGEST_ACQUAINTANCE: Duration = Duration::from_secs(5);
 const REFIT: Duration = Duration::from_millis(500);
 /// A reader that is silent for so long while the other one speaks is lost.
 const SILENCE: Duration = Duration::from_millis(250);
+/// Most samples in a batch: what has piled up is given in several.
+const LARGEST_BATCH: usize = 1024;
 /// Lines of the output that are kept behind the last instant.
 const KEPT: usize = 64;
 /// The other one has to be heard so often meanwhile: after a stall of this program both lines are full, and one is read first.
@@ -103,7 +104,7 @@ impl Qsb {
 
     fn profile(&self) -> Result<&QsbProfile, DeviceError> {
         self.profile.as_ref().ok_or_else(|| DeviceError::Line {
-            device: "counter",
+            device: DeviceKind::Counter,
             port: self.address.port.clone(),
             what: "the profile has no [counter.qsb]; `rigd profile check` says what belongs there".into(),
         })
@@ -266,7 +267,7 @@ impl Qsb {
             batch.input_delta.push(input_step);
             batch.output_delta.push(output_step);
             last = Some((sample.ticks, counts));
-            if batch.len() >= usize::from(MAX_SAMPLES_PER_FRAME) {
+            if batch.len() >= LARGEST_BATCH {
                 break;
             }
         }

@@ -10,8 +10,9 @@ use std::time::Duration;
 use serde::Serialize;
 use tokio::time::{Instant, timeout};
 
+use crate::device::bus::BusStatistics;
 use crate::device::refused::{TE_ASKED_RAD, check_resolution};
-use crate::device::{self, Brake, Counter, DeviceError, Servo, Zero};
+use crate::device::{Brake, BrakeStatus, Counter, DeviceError, DeviceKind, Servo, Zero, drivers};
 use crate::link::{Address, Link};
 use crate::profile::Profile;
 use crate::run::session::Links;
@@ -88,34 +89,34 @@ pub async fn examine(profile: &Profile, links: Links, consent: Consent, stop: &S
     let at =
         |device, port: &str, baud, format: &str| Address { device, port: port.into(), baud, format: format.into() };
     let addresses = [
-        at("servo", &servo.port, servo.baud, &servo.format),
-        at("brake", &brake.port, brake.baud, &brake.format),
-        at("counter", &counter.port, counter.baud, &counter.format),
+        at(DeviceKind::Servo, &servo.port, servo.baud, &servo.format),
+        at(DeviceKind::Brake, &brake.port, brake.baud, &brake.format),
+        at(DeviceKind::Counter, &counter.port, counter.baud, &counter.format),
     ];
     for address in &addresses {
         port::examine(&mut report, address);
     }
     if let Some(qsb) = &counter.qsb {
-        port::examine(&mut report, &at("counter", &qsb.output_port, counter.baud, &counter.format));
+        port::examine(&mut report, &at(DeviceKind::Counter, &qsb.output_port, counter.baud, &counter.format));
     }
     let [at_servo, at_brake, at_counter] = addresses;
     let mut servo = match (
         connect(&mut report, links.servo, &at_servo).await,
-        device::find(device::SERVOS, "servo", &servo.driver),
+        drivers::find(drivers::SERVOS, DeviceKind::Servo, &servo.driver),
     ) {
         (Some(link), Ok(open)) => Some(open(link, at_servo, servo)),
         _ => None,
     };
     let mut brake = match (
         connect(&mut report, links.brake, &at_brake).await,
-        device::find(device::BRAKES, "brake", &brake.driver),
+        drivers::find(drivers::BRAKES, DeviceKind::Brake, &brake.driver),
     ) {
         (Some(link), Ok(open)) => Some(open(link, at_brake, brake)),
         _ => None,
     };
     let mut counter = match (
         connect(&mut report, links.counter, &at_counter).await,
-        device::find(device::COUNTERS, "counter", &counter.driver),
+        drivers::find(drivers::COUNTERS, DeviceKind::Counter, &counter.driver),
     ) {
         (Some(link), Ok(open)) => Some(open(link, at_counter, counter)),
         _ => None,
@@ -159,7 +160,7 @@ async fn connect(report: &mut Report, link: Option<Link>, address: &Address) -> 
     match address.open().await {
         Ok(link) => Some(link),
         Err(error) => {
-            report.add(Grade::Fault, address.device, error.to_string(), "see the finding on its port above");
+            report.add(Grade::Fault, address.device.name(), error.to_string(), "see the finding on its port above");
             None
         }
     }
@@ -272,7 +273,7 @@ async fn examine_brake(report: &mut Report, brake: &mut dyn Brake, profile: &Pro
     }
     let begun = Instant::now();
     let mut slowest = Duration::ZERO;
-    let mut last = device::BrakeStatus::default();
+    let mut last = BrakeStatus::default();
     for _ in 0..REQUESTS / 4 {
         let asked = Instant::now();
         match brake.status().await {
@@ -329,7 +330,7 @@ fn latency(
     total: Duration,
     slowest: Duration,
     profile: &Profile,
-    line: &device::bus::BusStatistics,
+    line: &BusStatistics,
 ) {
     let mean_ms = total.as_secs_f64() * 1e3 / f64::from(REQUESTS);
     let slowest_ms = slowest.as_secs_f64() * 1e3;

@@ -98,10 +98,14 @@ fn present() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::DeviceKind;
 
     fn of(port: &str) -> Report {
         let mut report = Report::default();
-        examine(&mut report, &Address { device: "servo", port: port.into(), baud: 38_400, format: "8N2".into() });
+        examine(
+            &mut report,
+            &Address { device: DeviceKind::Servo, port: port.into(), baud: 38_400, format: "8N2".into() },
+        );
         report
     }
 

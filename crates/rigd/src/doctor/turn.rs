@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use tokio::time::{Instant, timeout};
-use wire::counter_box::SampleFlags;
+use wire::{SampleFlags, Samples};
 
 use super::{Grade, RATE_HZ, Report};
 use crate::device::{Brake, Counter, DeviceError, Servo};
@@ -31,7 +31,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn take(&mut self, batch: &wire::counter_box::Samples, counts_per_rev: u64) {
+    fn take(&mut self, batch: &Samples, counts_per_rev: u64) {
         let last = [batch.input_counts().last(), batch.output_counts().last()];
         let [Some(input), Some(output)] = last else { return };
         self.first.get_or_insert([batch.input_base, batch.output_base]);

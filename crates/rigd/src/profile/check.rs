@@ -9,15 +9,36 @@ use serde::de::DeserializeOwned;
 use toml::de::DeTable;
 use toml::{Table, Value};
 
+use super::devices::{BrakeProfile, CounterProfile, ServoProfile};
 use super::lines::{Fault, Lines};
-use super::{BrakeProfile, CounterProfile, Limits, LogPolicy, Profile, ProfileError, Sequence, ServoProfile};
+use super::{Limits, LogPolicy, Profile, ProfileError, Sequence};
 use crate::calibration::Calibration;
+use crate::device::drivers::{BRAKES, COUNTERS, SERVOS, find};
 use crate::device::map::{Map, MapError};
-use crate::device::{self, MAP};
-use crate::link::Address;
+use crate::device::{DeviceKind, map, refused};
+use crate::link;
 
 /// Rounds after which a file is taken to be something else altogether.
 const ROUNDS: usize = 200;
+
+impl Profile {
+    /// Reads and checks a profile and what it names.
+    ///
+    /// # Errors
+    /// [`ProfileError`] names the file and every fault in it with line, key, value and what is accepted.
+    pub fn load(path: &Path) -> Result<Self, ProfileError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ProfileError::Read { path: path.into(), source })?;
+        let faults = faults(&text, path);
+        if !faults.is_empty() {
+            return Err(ProfileError::Faults { path: path.into(), faults });
+        }
+        let mut profile = Self::parse(&text, path)?;
+        if let Some(calibration) = profile.calibration.clone() {
+            profile.calibrate(&path.parent().unwrap_or(Path::new("")).join(calibration))?;
+        }
+        Ok(profile)
+    }
+}
 
 /// Every fault of a profile's text; `path` tells where files that it names are looked for.
 #[must_use]
@@ -131,22 +152,28 @@ impl Check {
     fn devices(&mut self, profile: &Profile) {
         let (servo, brake, counter) = (&profile.servo, &profile.brake, &profile.counter);
         let unknown = [
-            ("servo", device::find(device::SERVOS, "servo", &servo.driver).err()),
-            ("brake", device::find(device::BRAKES, "brake", &brake.driver).err()),
-            ("counter", device::find(device::COUNTERS, "counter", &counter.driver).err()),
+            ("servo", find(SERVOS, DeviceKind::Servo, &servo.driver).err()),
+            ("brake", find(BRAKES, DeviceKind::Brake, &brake.driver).err()),
+            ("counter", find(COUNTERS, DeviceKind::Counter, &counter.driver).err()),
         ];
         for (section, error) in unknown {
             if let Some(error) = error {
-                let name = if section == "counter" { device::refused::reason(&counter.driver) } else { None };
+                let name = if section == "counter" { refused::reason(&counter.driver) } else { None };
                 self.fault(section, "driver", &name.unwrap_or_else(|| format!("is unknown: {error}")));
             }
         }
         for (section, driver, map) in [("servo", &servo.driver, &servo.map), ("brake", &brake.driver, &brake.map)] {
             match (driver.as_str(), map) {
-                (MAP, None) => self.fault(section, "map", "is missing: driver \"map\" needs map = \"FILE.toml\""),
-                (MAP, Some(file)) => self.map(section, file),
+                (map::DRIVER, None) => {
+                    self.fault(section, "map", "is missing: driver \"map\" needs map = \"FILE.toml\"");
+                }
+                (map::DRIVER, Some(file)) => self.map(section, file),
                 (_, Some(file)) => {
-                    self.fault(section, "map", &format!("= {} goes with driver = \"{MAP}\" only", file.display()));
+                    self.fault(
+                        section,
+                        "map",
+                        &format!("= {} goes with driver = \"{}\" only", file.display(), map::DRIVER),
+                    );
                 }
                 (_, None) => {}
             }
@@ -157,9 +184,8 @@ impl Check {
             ("counter", &counter.port, counter.baud, &counter.format),
         ];
         for (n, (section, port, baud, format)) in lines.iter().enumerate() {
-            let address = Address { device: "line", port: (*port).clone(), baud: *baud, format: (*format).clone() };
-            if let Err(error) = address.check_format() {
-                self.fault(section, "format", &format!("= {format:?}: {error}"));
+            if let Err(error) = link::check_format(format) {
+                self.fault(section, "format", &format!("= {format:?}: line: {error}"));
             }
             if !(300..=12_000_000).contains(baud) {
                 self.fault(section, "baud", &format!("= {baud} must be from 300 to 12000000 bit/s"));
@@ -246,6 +272,7 @@ fn shown(value: Option<&Value>) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::SIM_PROFILE;
+    use super::super::qsb::QSB_PROFILE;
     use super::*;
 
     fn of(text: &str) -> Vec<Fault> {
@@ -312,5 +339,35 @@ mod tests {
             text.replacen("driver = \"rd60xx\"\nport = \"sim\"", "driver = \"rd60xx\"\nport = \"/dev/ttyUSB0\"", 1);
         let found = of(&text);
         assert!(found.iter().any(|fault| fault.key == "brake.port" && fault.what.contains("servo")), "{found:?}");
+    }
+
+    #[test]
+    fn the_profile_of_two_readers_has_no_fault_and_states_its_source() {
+        assert_eq!(faults(QSB_PROFILE, Path::new("qsb.toml")), []);
+        let profile = Profile::parse(QSB_PROFILE, Path::new("qsb.toml")).expect("a profile");
+        assert!(profile.source.contains("QSB command list"), "{}", profile.source);
+        let qsb = profile.counter.qsb.as_ref().expect("readers");
+        assert_eq!((qsb.counts_per_rev(), qsb.rate_hz()), ([40_000; 2], 512.0));
+        assert_eq!(Profile::parse(&profile.to_toml(), Path::new("x")).expect("own TOML"), profile);
+    }
+
+    #[test]
+    fn every_wrong_value_of_two_readers_is_told_with_its_key() {
+        let output = "output_port = \"/dev/serial/by-id/usb-qsb-output\"";
+        for (from, to, key) in [
+            ("quadrature = 4", "quadrature = 3", "counter.qsb.quadrature"),
+            ("interval_ticks = 1", "interval_ticks = 0", "counter.qsb.interval_ticks"),
+            ("lines = [10000, 10000]", "lines = [10000, 0]", "counter.qsb.lines"),
+            ("transit_difference_ms = 1.0", "transit_difference_ms = -1.0", "counter.qsb.transit_difference_ms"),
+            ("# zero_counts = [0, 0]", "zero_counts = [0, 9000000000]", "counter.qsb.zero_counts"),
+            (output, "output_port = \"/dev/serial/by-id/usb-qsb-input\"", "counter.qsb.output_port"),
+            (output, "output_port = \"sim\"", "counter.qsb.output_port"),
+            ("driver = \"qsb\"", "driver = \"counter-box\"", "counter.qsb"),
+        ] {
+            let text = QSB_PROFILE.replacen(from, to, 1);
+            assert_ne!(text, QSB_PROFILE, "{from}");
+            let found = faults(&text, Path::new("qsb.toml"));
+            assert!(found.len() == 1 && found[0].key == key && found[0].line > 1, "{to}: {found:?}");
+        }
     }
 }

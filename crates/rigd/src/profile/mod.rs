@@ -1,6 +1,7 @@
 //! The rig's profile: which devices, on which ports, within which limits. TOML, checked before anything moves.
 
 pub mod check;
+pub mod devices;
 pub mod lines;
 pub mod qsb;
 
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::calibration::{Calibration, CalibrationFileError};
-use crate::device::bus::Horizon;
+pub use devices::{BrakeProfile, CounterProfile, QsbProfile, ServoProfile};
 use lines::Fault;
 
 /// The embedded profile: emulated hardware in this process.
@@ -47,126 +48,6 @@ pub struct Profile {
     pub sequence: Sequence,
     /// How the log is kept.
     pub log: LogPolicy,
-}
-
-/// A serial line or socket and its settings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ServoProfile {
-    /// Driver's name, see `device::SERVOS`.
-    pub driver: String,
-    /// Register map, with driver `map`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub map: Option<PathBuf>,
-    /// Path, `tcp://host:port`, or `sim`.
-    pub port: String,
-    /// Line speed, bit/s.
-    pub baud: u32,
-    /// Character format, for instance `8N2`.
-    pub format: String,
-    /// Modbus unit.
-    pub unit: u8,
-    /// Motor turns a turn of the driver gear.
-    pub reduction: f64,
-    /// +1, or −1 when a positive motor speed turns the driver clockwise.
-    pub sense: i8,
-    /// Ramp from 0 to 3000 rpm of the motor, ms.
-    pub accel_ms: f64,
-    /// Ramp from 3000 rpm of the motor to 0, ms.
-    pub decel_ms: f64,
-    /// A late answer of its line may come until so long after its request, ms; more where a gateway holds answers back.
-    #[serde(default = "late_ms")]
-    pub late_ms: f64,
-    /// An answer may come once more until so long after it was taken, ms.
-    #[serde(default = "repeated_ms")]
-    pub repeated_ms: f64,
-}
-
-impl ServoProfile {
-    /// How long answers may come after they were due.
-    #[must_use]
-    pub fn horizon(&self) -> Horizon {
-        horizon(self.late_ms, self.repeated_ms)
-    }
-}
-
-/// The brake, its driver and its calibration.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BrakeProfile {
-    /// Driver's name, see `device::BRAKES`.
-    pub driver: String,
-    /// Register map, with driver `map`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub map: Option<PathBuf>,
-    /// Path, `tcp://host:port`, or `sim`.
-    pub port: String,
-    /// Line speed, bit/s.
-    pub baud: u32,
-    /// Character format.
-    pub format: String,
-    /// Modbus unit.
-    pub unit: u8,
-    /// Voltage limit of the coil's source, V.
-    pub voltage_v: f64,
-    /// Largest coil current, A.
-    pub current_limit_a: f64,
-    /// Brake turns a turn of the driven gear.
-    pub step_up: f64,
-    /// Rising branch: [coil current A, brake torque N·m], both increasing.
-    pub rising: Vec<[f64; 2]>,
-    /// Falling branch, likewise.
-    pub falling: Vec<[f64; 2]>,
-    /// A late answer of its line may come until so long after its request, ms; more where a gateway holds answers back.
-    #[serde(default = "late_ms")]
-    pub late_ms: f64,
-    /// An answer may come once more until so long after it was taken, ms.
-    #[serde(default = "repeated_ms")]
-    pub repeated_ms: f64,
-}
-
-fn late_ms() -> f64 {
-    Horizon::default().late.as_secs_f64() * 1e3
-}
-
-fn repeated_ms() -> f64 {
-    Horizon::default().repeated.as_secs_f64() * 1e3
-}
-
-fn horizon(late_ms: f64, repeated_ms: f64) -> Horizon {
-    let time = |ms: f64| Duration::try_from_secs_f64(ms * 1e-3).unwrap_or_default();
-    Horizon { late: time(late_ms), repeated: time(repeated_ms) }
-}
-
-/// The counter box.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CounterProfile {
-    /// Driver's name, see `device::COUNTERS`.
-    pub driver: String,
-    /// Path, `tcp://host:port`, or `sim`.
-    pub port: String,
-    /// Line speed, bit/s.
-    pub baud: u32,
-    /// Character format.
-    pub format: String,
-    /// Unused by the counter box, which is alone on its line.
-    #[serde(default)]
-    pub unit: u8,
-    /// +1, or −1 when the input counts fall while the pair turns in its ccw sense.
-    pub input_sign: i8,
-    /// +1 or −1, likewise for the driven gear.
-    pub output_sign: i8,
-    /// How far the input encoder's disc is turned on its shaft against its usual place, in the angle's positive sense, deg: for its
-    /// calibration, where it is re-mounted. The angles stay those of the gears.
-    #[serde(default)]
-    pub input_mounted_deg: f64,
-    /// Likewise the output encoder's.
-    #[serde(default)]
-    pub output_mounted_deg: f64,
-    /// Two readers, with driver `qsb`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub qsb: Option<qsb::QsbProfile>,
 }
 
 /// Limits, refused before motion and supervised during it.
@@ -309,32 +190,24 @@ impl Profile {
         Self::parse(SIM_PROFILE, Path::new("(embedded)")).expect("the embedded profile is valid")
     }
 
-    /// Reads and checks a profile and what it names.
-    ///
-    /// # Errors
-    /// [`ProfileError`] names the file and every fault in it with line, key, value and what is accepted.
-    pub fn load(path: &Path) -> Result<Self, ProfileError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ProfileError::Read { path: path.into(), source })?;
-        let faults = check::faults(&text, path);
-        if !faults.is_empty() {
-            return Err(ProfileError::Faults { path: path.into(), faults });
-        }
-        let mut profile = Self::parse(&text, path)?;
-        if let Some(calibration) = profile.calibration.clone() {
-            profile.calibrate(&path.parent().unwrap_or(Path::new("")).join(calibration))?;
-        }
-        Ok(profile)
-    }
-
     /// Takes over the calibration at `path`.
     ///
     /// # Errors
     /// [`ProfileError::Calibration`] names the file and what is wrong with it.
     pub fn calibrate(&mut self, path: &Path) -> Result<(), ProfileError> {
         let (calibration, text) = Calibration::load(path)?;
-        calibration.apply(self);
+        self.apply(&calibration);
         self.calibration_toml = Some(text);
         Ok(())
+    }
+
+    /// Puts what a run needs of a calibration into the profile.
+    pub fn apply(&mut self, calibration: &Calibration) {
+        if let Some(brake) = &calibration.brake {
+            let points = |branch: &[[f64; 3]]| branch.iter().map(|point| [point[0], point[1]]).collect();
+            self.brake.rising = points(&brake.rising);
+            self.brake.falling = points(&brake.falling);
+        }
     }
 
     /// Checks a profile's text; `path` is for the error.
@@ -471,61 +344,10 @@ impl Profile {
     }
 }
 
-impl BrakeProfile {
-    /// How long answers may come after they were due.
-    #[must_use]
-    pub fn horizon(&self) -> Horizon {
-        horizon(self.late_ms, self.repeated_ms)
-    }
-
-    /// Coil current that loads the driven gear with `load_nm`, by the rising branch; `None` beyond its end.
-    ///
-    /// The brake turns `step_up` times as fast as the driven gear, so its torque is the load divided by it.
-    #[must_use]
-    pub fn current_a(&self, load_nm: f64) -> Option<f64> {
-        let torque = load_nm / self.step_up;
-        let (first, last) = (self.rising.first()?, self.rising.last()?);
-        if torque <= first[1] {
-            // Less than the drag cannot be had; no current is the closest.
-            return Some(first[0]);
-        }
-        if torque > last[1] {
-            return None;
-        }
-        let above = self.rising.iter().position(|point| point[1] >= torque)?;
-        let (low, high) = (self.rising[above - 1], self.rising[above]);
-        let current = low[0] + (torque - low[1]) / (high[1] - low[1]) * (high[0] - low[0]);
-        (current <= self.current_limit_a).then_some(current)
-    }
-
-    /// As [`BrakeProfile::current_a`], where the coil has `from_a` now: down from a larger current, the torque lies on the falling branch.
-    #[must_use]
-    pub fn current_from_a(&self, load_nm: f64, from_a: f64) -> Option<f64> {
-        let up = self.current_a(load_nm)?;
-        let falling = Self { rising: self.falling.clone(), ..self.clone() };
-        let down = falling.current_a(load_nm).filter(|down| *down < from_a && up < from_a);
-        Some(down.unwrap_or(up))
-    }
-
-    /// Load at the driven gear for a coil current on the rising branch.
-    #[must_use]
-    pub fn load_nm(&self, current_a: f64) -> f64 {
-        let above = self.rising.iter().position(|point| point[0] >= current_a).unwrap_or(self.rising.len() - 1).max(1);
-        let (low, high) = (self.rising[above - 1], self.rising[above]);
-        let torque = low[1] + (current_a - low[0]) / (high[0] - low[0]) * (high[1] - low[1]);
-        torque.max(self.rising[0][1]) * self.step_up
-    }
-
-    /// The least load that the brake can set: its drag.
-    #[must_use]
-    pub fn drag_nm(&self) -> f64 {
-        self.rising[0][1] * self.step_up
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibration::BrakeCalibration;
 
     #[test]
     fn embedded_profile_is_valid_and_round_trips() {
@@ -536,14 +358,25 @@ mod tests {
     }
 
     #[test]
-    fn brake_curve_inverts() {
-        let brake = Profile::simulated().brake;
-        for load in [0.5, 5.0, 10.0, 20.0] {
-            let current = brake.current_a(load).expect("within the curve");
-            assert!((brake.load_nm(current) - load).abs() < 1e-12);
-        }
-        assert_eq!(brake.current_a(0.0), Some(0.0));
-        assert_eq!(brake.current_a(1e3), None);
+    fn a_calibration_changes_the_brake() {
+        let brake = BrakeCalibration {
+            date: "2026-11-22T06:00:00Z".into(),
+            rig: "lab".into(),
+            method: "servo torque".into(),
+            coverage_factor: 2.0,
+            speed_rpm: 25.0,
+            temperature_c: 31.0,
+            rising: vec![[0.0, 0.3, 0.05], [0.5, 10.0, 0.1]],
+            falling: vec![[0.0, 0.3, 0.05], [0.5, 11.0, 0.1]],
+        };
+        let mut profile = Profile::simulated();
+        profile.apply(&Calibration { brake: Some(brake), ..Calibration::default() });
+        assert_eq!(profile.brake.rising, [[0.0, 0.3], [0.5, 10.0]]);
+        let near = |current: Option<f64>| (current.unwrap() - 0.25).abs() < 1e-12;
+        assert!(near(profile.brake.current_a(5.15)));
+        // Down from more current the torque lies on the other branch.
+        assert!(near(profile.brake.current_from_a(5.65, 0.4)));
+        assert!(near(profile.brake.current_from_a(5.15, 0.1)));
     }
 
     #[test]

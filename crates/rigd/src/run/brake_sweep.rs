@@ -8,11 +8,13 @@ use gearmodel::Direction;
 use gearmodel::calibration::{Sweep, TorqueReading};
 use riglog::proto::{Level, Phase};
 
-use super::Plan;
-use super::halt::Halt;
+use super::admission::{Terms, admit_heat};
+use super::connected_rig::ConnectedRig;
 use super::job::Job;
-use super::rig::Rig;
+use super::limits::Limit;
+use super::plan::RunPlan;
 use super::sequence;
+use super::stop_reason::StopReason;
 use crate::device::DeviceError;
 
 /// The coil is given this long for each new current, in times of the profile's `load_s`.
@@ -49,9 +51,9 @@ pub struct Swept {
 /// Sweeps the brake; what was measured is in `swept`, even where the sweep ends early.
 ///
 /// # Errors
-/// [`Halt`] says why it ended; the caller switches off.
-pub async fn execute(rig: &mut Rig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<(), Halt> {
-    let turning = Plan {
+/// [`StopReason`] says why it ended; the caller switches off.
+pub async fn execute(rig: &mut ConnectedRig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<(), StopReason> {
+    let turning = RunPlan {
         directions: vec![Direction::Ccw],
         loads_nm: vec![0.0],
         speed_rpm: plan.speed_rpm,
@@ -59,6 +61,8 @@ pub async fn execute(rig: &mut Rig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>
         rate_hz: plan.rate_hz,
         accept_no_watchdog: false,
     };
+    // The currents go up to what loads the gear to its limit.
+    admit_heat(&rig.profile, Terms::SET_POINTS, rig.profile.limits.load_nm, plan.speed_rpm)?;
     sequence::prepare(rig, &Job::of(&turning)).await?;
     rig.enter(Phase::Approach);
     rig.set_coil_current(0.0).await?;
@@ -90,11 +94,11 @@ pub async fn execute(rig: &mut Rig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>
 
 /// Mean torque over whole turns: ∮T dθ1 / 2π, by the trapezium rule over the angles at which the torque was asked for.
 async fn read(
-    rig: &mut Rig,
+    rig: &mut ConnectedRig,
     plan: &SweepPlan,
     current_a: f64,
     swept: &Rc<RefCell<Swept>>,
-) -> Result<TorqueReading, Halt> {
+) -> Result<TorqueReading, StopReason> {
     let mut means = Vec::new();
     let (mut angle, mut torque) = ask(rig, plan, swept).await?;
     let (mut least, mut most) = (torque, torque);
@@ -104,7 +108,7 @@ async fn read(
     while means.len() < plan.turns as usize {
         if tokio::time::Instant::now() > deadline {
             let now = format!("{:.2} rpm", rig.acquisition.borrow().latest.speed_rpm);
-            return Err(Halt::TooLong {
+            return Err(StopReason::TooLong {
                 what: "the turns of a calibration point",
                 seconds: 60.0 / plan.speed_rpm * f64::from(plan.turns),
                 now,
@@ -133,26 +137,17 @@ async fn read(
 }
 
 /// One poll of everything: the driver's angle and its torque, N·m.
-async fn ask(rig: &mut Rig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<(f64, f64), Halt> {
+async fn ask(rig: &mut ConnectedRig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<(f64, f64), StopReason> {
     rig.tick().await?;
     let torque = rig.servo.motor_torque_percent().await;
     let Some((percent, step)) = rig.note(torque)? else {
-        return Err(Halt::Device(DeviceError::NoTorque { port: rig.profile.servo.port.clone() }));
+        return Err(StopReason::Device(DeviceError::NoTorque { port: rig.profile.servo.port.clone() }));
     };
     let at_driver = |percent: f64| percent / 100.0 * plan.rated_torque_nm * rig.profile.servo.reduction;
     swept.borrow_mut().resolution_nm = at_driver(step);
     let torque_nm = f64::from(rig.profile.servo.sense) * at_driver(percent);
     let limit_nm = rig.profile.limits.load_nm * LARGEST_RATIO;
-    if torque_nm.abs() > limit_nm {
-        return Err(Halt::Limit {
-            quantity: "torque at the driver",
-            value: torque_nm.abs(),
-            limit: limit_nm,
-            unit: "N·m",
-            key: "three times limits.load_nm",
-            advice: "calibrate up to a smaller current (--max-current)",
-        });
-    }
+    Limit::SweepTorque.check(torque_nm.abs(), limit_nm)?;
     Ok((rig.acquisition.borrow().latest.theta1_rad, torque_nm))
 }
 

@@ -2,7 +2,7 @@
 
 use gearmodel::Direction;
 
-use super::Plan;
+use super::plan::RunPlan;
 
 /// What a run is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -84,7 +84,7 @@ impl Job {
 
     /// The runs of a plan: every load, both senses at each.
     #[must_use]
-    pub fn of(plan: &Plan) -> Self {
+    pub fn of(plan: &RunPlan) -> Self {
         let runs = plan.loads_nm.iter().flat_map(|&load_nm| {
             plan.directions.iter().map(move |&direction| RunSpec {
                 kind: Kind::Measure,
@@ -159,7 +159,7 @@ mod tests {
     use super::*;
 
     fn job() -> Job {
-        Job::of(&Plan {
+        Job::of(&RunPlan {
             directions: vec![Direction::Ccw, Direction::Cw],
             loads_nm: vec![5.0, 10.0],
             speed_rpm: 5.0,

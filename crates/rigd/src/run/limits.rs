@@ -1,6 +1,7 @@
 //! The limits of the profile, supervised during motion, and the brake's heat account. Pure: what is observed against what is allowed.
 
-use super::halt::Halt;
+use thiserror::Error;
+
 use crate::profile::Limits;
 
 /// Ramps overshoot a set-point at the limit a little, and a current source regulates: the supervised limit is this much wider than
@@ -23,52 +24,119 @@ pub struct Observed {
     pub excursion_rad: f64,
 }
 
-/// Checks everything that is observed against its limit; a value that is no number is over it.
-///
-/// # Errors
-/// [`Halt::Limit`] names quantity, value, limit and the profile's key.
-pub fn check(limits: &Limits, observed: &Observed) -> Result<(), Halt> {
-    let over = |quantity, value: f64, limit: f64, unit, key, advice| {
-        if value <= limit { Ok(()) } else { Err(Halt::Limit { quantity, value, limit, unit, key, advice }) }
-    };
-    over(
-        "driver speed",
-        observed.speed_rpm.abs(),
-        limits.speed_rpm * OVERSHOOT,
-        "rpm",
-        "limits.speed_rpm, and a tenth",
-        "check servo.reduction and the drive's tuning",
-    )?;
-    over(
-        "load",
-        observed.load_nm,
-        limits.load_nm * OVERSHOOT,
-        "N·m",
-        "limits.load_nm, and a tenth",
-        "check the brake's current source and its calibration",
-    )?;
-    over(
-        "brake temperature",
-        observed.brake_temperature_c,
-        limits.brake_temperature_c,
-        "°C",
-        KEY_TEMPERATURE,
-        "let the brake cool, or lower load or speed",
-    )?;
-    over(
-        "TE excursion",
-        observed.excursion_rad * 1e3,
-        limits.te_excursion_mrad,
-        "mrad",
-        "limits.te_excursion_mrad",
-        "inspect the teeth before the next run",
-    )
+/// A limit that is supervised during motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Limit {
+    /// Speed of the driver, with its overshoot.
+    Speed,
+    /// Load at the driven gear, with its overshoot.
+    Load,
+    /// Temperature of the brake or its driver.
+    BrakeTemperature,
+    /// Departure of TE from the model.
+    TeExcursion,
+    /// The brake's heat account.
+    BrakeHeat,
+    /// Speed while turning for set-up, against the speed asked for.
+    SetUpSpeed,
+    /// Torque at the driver while the brake is calibrated.
+    SweepTorque,
 }
 
-/// Key of the temperature's limit.
-pub const KEY_TEMPERATURE: &str = "limits.brake_temperature_c";
-/// Key of the heat account.
-pub const KEY_HEAT: &str = "60 s of limits.slip_power_w";
+impl Limit {
+    /// What goes over.
+    #[must_use]
+    pub fn quantity(self) -> &'static str {
+        match self {
+            Self::Speed | Self::SetUpSpeed => "driver speed",
+            Self::Load => "load",
+            Self::BrakeTemperature => "brake temperature",
+            Self::TeExcursion => "TE excursion",
+            Self::BrakeHeat => "brake heat account",
+            Self::SweepTorque => "torque at the driver",
+        }
+    }
+
+    /// Its unit.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Speed | Self::SetUpSpeed => "rpm",
+            Self::Load | Self::SweepTorque => "N·m",
+            Self::BrakeTemperature => "°C",
+            Self::TeExcursion => "mrad",
+            Self::BrakeHeat => "J",
+        }
+    }
+
+    /// Where in the profile it is set.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Speed => "limits.speed_rpm, and a tenth",
+            Self::Load => "limits.load_nm, and a tenth",
+            Self::BrakeTemperature => "limits.brake_temperature_c",
+            Self::TeExcursion => "limits.te_excursion_mrad",
+            Self::BrakeHeat => "60 s of limits.slip_power_w",
+            Self::SetUpSpeed => "one and a half times --rpm",
+            Self::SweepTorque => "three times limits.load_nm",
+        }
+    }
+
+    /// What to do next.
+    #[must_use]
+    pub fn advice(self) -> &'static str {
+        match self {
+            Self::Speed => "check servo.reduction and the drive's tuning",
+            Self::Load => "check the brake's current source and its calibration",
+            Self::BrakeTemperature => "let the brake cool, or lower load or speed",
+            Self::TeExcursion => "inspect the teeth before the next run",
+            Self::BrakeHeat => "lower load or speed, or pause between runs",
+            Self::SetUpSpeed => "check servo.reduction and the encoder's lines",
+            Self::SweepTorque => "calibrate up to a smaller current (--max-current)",
+        }
+    }
+
+    /// A brake that has cooled is within it again.
+    #[must_use]
+    pub fn is_remedied_by_cooling(self) -> bool {
+        matches!(self, Self::BrakeTemperature | Self::BrakeHeat)
+    }
+
+    /// Checks a value; one that is no number is over its limit.
+    ///
+    /// # Errors
+    /// [`Exceeded`] names quantity, value, limit and the profile's key.
+    pub fn check(self, value: f64, allowed: f64) -> Result<(), Exceeded> {
+        if value <= allowed { Ok(()) } else { Err(Exceeded { limit: self, value, allowed }) }
+    }
+}
+
+/// A value over its limit.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error(
+    "{} {value:.4} {} is over the limit {allowed} {} of the profile ({}); {}",
+    limit.quantity(), limit.unit(), limit.unit(), limit.key(), limit.advice()
+)]
+pub struct Exceeded {
+    /// Which limit.
+    pub limit: Limit,
+    /// What was observed, in the limit's unit.
+    pub value: f64,
+    /// The limit.
+    pub allowed: f64,
+}
+
+/// Checks everything that is observed against its limit.
+///
+/// # Errors
+/// The first that is [`Exceeded`].
+pub fn check(limits: &Limits, observed: &Observed) -> Result<(), Exceeded> {
+    Limit::Speed.check(observed.speed_rpm.abs(), limits.speed_rpm * OVERSHOOT)?;
+    Limit::Load.check(observed.load_nm, limits.load_nm * OVERSHOOT)?;
+    Limit::BrakeTemperature.check(observed.brake_temperature_c, limits.brake_temperature_c)?;
+    Limit::TeExcursion.check(observed.excursion_rad * 1e3, limits.te_excursion_mrad)
+}
 
 /// Power that the brake turns into heat: W = T·ω of the driven gear; its mean speed is the driver's.
 #[must_use]
@@ -96,7 +164,7 @@ impl HeatAccount {
         self.heat_j
     }
 
-    /// DeviceKind of its room that is taken; above 1 it is spent.
+    /// Part of its room that is taken; above 1 it is spent.
     #[must_use]
     pub fn fraction(&self, limits: &Limits) -> f64 {
         self.heat_j / (limits.slip_power_w * HEAT_SECONDS)
@@ -105,20 +173,9 @@ impl HeatAccount {
     /// Checks that there is room left.
     ///
     /// # Errors
-    /// [`Halt::Limit`] when it is spent.
-    pub fn check(&self, limits: &Limits) -> Result<(), Halt> {
-        let limit = limits.slip_power_w * HEAT_SECONDS;
-        if self.heat_j <= limit {
-            return Ok(());
-        }
-        Err(Halt::Limit {
-            quantity: "brake heat account",
-            value: self.heat_j,
-            limit,
-            unit: "J",
-            key: KEY_HEAT,
-            advice: "lower load or speed, or pause between runs",
-        })
+    /// [`Limit::BrakeHeat`] is [`Exceeded`] when it is spent.
+    pub fn check(&self, limits: &Limits) -> Result<(), Exceeded> {
+        Limit::BrakeHeat.check(self.heat_j, limits.slip_power_w * HEAT_SECONDS)
     }
 }
 
@@ -131,12 +188,8 @@ mod tests {
         Profile::simulated().limits
     }
 
-    fn key(outcome: Result<(), Halt>) -> Option<&'static str> {
-        match outcome {
-            Ok(()) => None,
-            Err(Halt::Limit { key, .. }) => Some(key),
-            Err(other) => panic!("{other}"),
-        }
+    fn key(outcome: Result<(), Exceeded>) -> Option<&'static str> {
+        outcome.err().map(|exceeded| exceeded.limit.key())
     }
 
     #[test]
@@ -155,7 +208,7 @@ mod tests {
             (Observed { speed_rpm: speed * hair, ..just }, "limits.speed_rpm, and a tenth"),
             (Observed { speed_rpm: -speed * hair, ..just }, "limits.speed_rpm, and a tenth"),
             (Observed { load_nm: load * hair, ..just }, "limits.load_nm, and a tenth"),
-            (Observed { brake_temperature_c: limits.brake_temperature_c * hair, ..just }, KEY_TEMPERATURE),
+            (Observed { brake_temperature_c: limits.brake_temperature_c * hair, ..just }, "limits.brake_temperature_c"),
             (Observed { excursion_rad: just.excursion_rad * hair, ..just }, "limits.te_excursion_mrad"),
         ] {
             assert_eq!(key(check(&limits, &over)), Some(expected), "{over:?}");
@@ -165,7 +218,7 @@ mod tests {
     #[test]
     fn a_value_that_is_no_number_is_over_its_limit() {
         let nan = Observed { brake_temperature_c: f64::NAN, ..Observed::default() };
-        assert_eq!(key(check(&limits(), &nan)), Some(KEY_TEMPERATURE));
+        assert_eq!(key(check(&limits(), &nan)), Some("limits.brake_temperature_c"));
         assert!(key(check(&limits(), &Observed { speed_rpm: f64::NAN, ..Observed::default() })).is_some());
     }
 
@@ -188,7 +241,7 @@ mod tests {
         just.book(&limits, 0.0, 0.0, 0.001);
         assert_eq!(key(just.check(&limits)), None);
         over.book(&limits, load_nm, 100.0, 0.001);
-        assert_eq!(key(over.check(&limits)), Some(KEY_HEAT));
+        assert_eq!(key(over.check(&limits)), Some("60 s of limits.slip_power_w"));
         // At the continuous power nothing changes; without slip it is empty after a minute, and no emptier.
         just.book(&limits, 0.5 * load_nm, 100.0, 1e4);
         assert!((just.fraction(&limits) - 1.0).abs() < 1e-4);

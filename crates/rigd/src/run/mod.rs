@@ -1,40 +1,28 @@
 //! One run of the rig, from connecting to the finalised log.
 
 pub mod acquire;
-pub mod attend;
+pub mod admission;
 pub mod brake_sweep;
-pub mod halt;
+pub mod connected_rig;
+pub mod dialer;
 pub mod job;
 pub mod keys;
 pub mod limits;
+pub mod observer;
+pub mod panic;
+pub mod plan;
 pub mod progress;
-pub mod reconnect;
+mod reconnect;
 pub mod recorder;
-pub mod rig;
+pub mod registry;
+pub mod run_job;
+pub mod senses;
 pub mod sequence;
 pub mod session;
 pub mod set_up;
 pub mod settle;
 pub mod space;
 pub mod stop;
+pub mod stop_reason;
 pub mod stopping;
 pub mod supervisor;
-
-use gearmodel::Direction;
-
-/// What a run shall measure.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
-    /// Senses, in their order.
-    pub directions: Vec<Direction>,
-    /// Loads at the driven gear, N·m, in their order.
-    pub loads_nm: Vec<f64>,
-    /// Speed of the driver, rpm.
-    pub speed_rpm: f64,
-    /// Whole revolutions of the driver to record, each.
-    pub revolutions: f64,
-    /// Sampling, Hz.
-    pub rate_hz: f64,
-    /// The operator accepts a drive that has no watchdog of its own.
-    pub accept_no_watchdog: bool,
-}

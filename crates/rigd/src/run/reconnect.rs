@@ -1,91 +1,19 @@
-//! Opens the three devices, and opens them again once they were lost.
+//! Opens devices again once they were lost.
 
-use std::rc::Rc;
 use std::time::Duration;
 
 use riglog::proto::{Level, Phase};
 use tokio::time::{Instant, sleep};
 
-use super::halt::Halt;
-use super::rig::Rig;
-use crate::device::stand_in::StandIn;
-use crate::device::{self, Brake, BusError, Counter, DeviceError, DeviceKind, Servo};
-use crate::link::{Address, Link};
-use crate::profile::Profile;
+use super::connected_rig::ConnectedRig;
+use super::stop_reason::StopReason;
+use crate::device::lost_device::LostDevice;
+use crate::device::{BusError, DeviceError, DeviceKind};
 
 /// How often a lost device is called. With its own time-outs it is heard within 2 s of its return.
 const CALL_PERIOD: Duration = Duration::from_millis(250);
 
-/// Opens a device's line another time; `None` while it is out of reach. For emulators within this process.
-pub type Redial = Rc<dyn Fn(DeviceKind) -> Option<Link>>;
-
-/// Knows where the devices are.
-pub struct Dialer {
-    profile: Profile,
-    redial: Option<Redial>,
-}
-
-impl Dialer {
-    /// For the devices of a profile; by `redial` where they are emulated within this process.
-    #[must_use]
-    pub fn new(profile: Profile, redial: Option<Redial>) -> Self {
-        Self { profile, redial }
-    }
-
-    fn address(&self, part: DeviceKind) -> Address {
-        let Profile { servo, brake, counter, .. } = &self.profile;
-        let (port, baud, format) = match part {
-            DeviceKind::Servo => (&servo.port, servo.baud, &servo.format),
-            DeviceKind::Brake => (&brake.port, brake.baud, &brake.format),
-            DeviceKind::Counter => (&counter.port, counter.baud, &counter.format),
-        };
-        Address { device: part.name(), port: port.clone(), baud, format: format.clone() }
-    }
-
-    async fn link(&self, link: Option<Link>, address: &Address, part: DeviceKind) -> Result<Link, Halt> {
-        match (link, &self.redial) {
-            (Some(link), _) => Ok(link),
-            (None, Some(redial)) => redial(part).ok_or_else(|| {
-                let (device, port) = (address.device, address.port.clone());
-                let reason = "the emulated device is unplugged".into();
-                Halt::Device(DeviceError::Bus(BusError::HungUp { device, port, reason }))
-            }),
-            (None, None) => Ok(address.open().await?),
-        }
-    }
-
-    /// The servo, on `link` where there is one already.
-    ///
-    /// # Errors
-    /// [`Halt::Driver`], [`Halt::Link`].
-    pub async fn servo(&self, link: Option<Link>) -> Result<Box<dyn Servo>, Halt> {
-        let driver = device::find(device::SERVOS, "servo", &self.profile.servo.driver)?;
-        let address = self.address(DeviceKind::Servo);
-        Ok(driver(self.link(link, &address, DeviceKind::Servo).await?, address, &self.profile.servo))
-    }
-
-    /// The brake's driver.
-    ///
-    /// # Errors
-    /// As [`Dialer::servo`].
-    pub async fn brake(&self, link: Option<Link>) -> Result<Box<dyn Brake>, Halt> {
-        let driver = device::find(device::BRAKES, "brake", &self.profile.brake.driver)?;
-        let address = self.address(DeviceKind::Brake);
-        Ok(driver(self.link(link, &address, DeviceKind::Brake).await?, address, &self.profile.brake))
-    }
-
-    /// The reader of the encoders.
-    ///
-    /// # Errors
-    /// As [`Dialer::servo`].
-    pub async fn counter(&self, link: Option<Link>) -> Result<Box<dyn Counter>, Halt> {
-        let driver = device::find(device::COUNTERS, "counter", &self.profile.counter.driver)?;
-        let address = self.address(DeviceKind::Counter);
-        Ok(driver(self.link(link, &address, DeviceKind::Counter).await?, address, &self.profile.counter))
-    }
-}
-
-impl Rig {
+impl ConnectedRig {
     /// Some device does not answer.
     #[must_use]
     pub fn has_lost_devices(&self) -> bool {
@@ -95,35 +23,35 @@ impl Rig {
     /// Waits for every lost device, and says in the log what was lost, since when, and when it came back. The rig is off.
     ///
     /// # Errors
-    /// [`Halt::NotBack`] after `patience_s`; [`Halt::Operator`].
-    pub async fn reconnect(&mut self, patience_s: f64) -> Result<(), Halt> {
+    /// [`StopReason::NotBack`] after `patience_s`; [`StopReason::Operator`].
+    pub async fn reconnect(&mut self, patience_s: f64) -> Result<(), StopReason> {
         self.enter(Phase::Fault);
         let began = Instant::now();
         let mut announced = [false; 3];
         let mut last = String::new();
         loop {
-            self.heed_stop()?;
+            self.check_stop()?;
             self.log_works()?;
-            for part in DeviceKind::ALL.into_iter().filter(|part| self.lost[*part as usize]).collect::<Vec<_>>() {
-                if !std::mem::replace(&mut announced[part as usize], true) {
-                    self.announce_gap(part, patience_s).await;
+            for device in DeviceKind::ALL.into_iter().filter(|device| self.lost[*device as usize]).collect::<Vec<_>>() {
+                if !std::mem::replace(&mut announced[device as usize], true) {
+                    self.announce_gap(device, patience_s).await;
                 }
-                match self.call(part).await {
+                match self.call(device).await {
                     Ok(identity) => {
-                        self.lost[part as usize] = false;
+                        self.lost[device as usize] = false;
                         let waited_s = began.elapsed().as_secs_f64();
-                        let what = format!("{part} is back {waited_s:.2} s after it was given up: {identity}");
+                        let what = format!("{device} is back {waited_s:.2} s after it was given up: {identity}");
                         self.acquisition.borrow().event(Level::Info, "reconnect", what);
                     }
                     Err(error) => last = error.to_string(),
                 }
             }
-            let Some(part) = DeviceKind::ALL.into_iter().find(|part| self.lost[*part as usize]) else {
+            let Some(device) = DeviceKind::ALL.into_iter().find(|device| self.lost[*device as usize]) else {
                 self.enter(Phase::Idle);
                 return Ok(());
             };
             if began.elapsed().as_secs_f64() > patience_s {
-                return Err(Halt::NotBack { part, patience_s, last });
+                return Err(StopReason::NotBack { device, patience_s, last });
             }
             sleep(CALL_PERIOD).await;
             self.poll_the_others().await;
@@ -144,8 +72,8 @@ impl Rig {
         self.acquisition.borrow().write_state();
     }
 
-    async fn announce_gap(&mut self, part: DeviceKind, patience_s: f64) {
-        let now = match part {
+    async fn announce_gap(&mut self, device: DeviceKind, patience_s: f64) {
+        let now = match device {
             DeviceKind::Counter => {
                 // Its port is closed, and what it said before is no part of what it says next.
                 if let Some(stream) = self.stream.take() {
@@ -159,21 +87,21 @@ impl Rig {
             }
             DeviceKind::Servo | DeviceKind::Brake => String::new(),
         };
-        let port = self.dialer.address(part).port;
-        let what = format!("{part} on {port} is lost{now}; it is called until it answers, up to {patience_s} s");
+        let port = self.dialer.address(device).port;
+        let what = format!("{device} on {port} is lost{now}; it is called until it answers, up to {patience_s} s");
         self.acquisition.borrow().event(Level::Warning, "gap", what);
     }
 
     /// Calls a lost device, by the open line while there is one, else by a new one; who it says it is.
-    async fn call(&mut self, part: DeviceKind) -> Result<String, Halt> {
-        match part {
+    async fn call(&mut self, device: DeviceKind) -> Result<String, StopReason> {
+        match device {
             DeviceKind::Servo => self.call_servo_by_name().await,
             DeviceKind::Brake => {
                 let said = self.brake.identify().await;
                 let Err(error) = said else { return Ok(said?.text) };
                 if hung_up(&error) {
                     let (port, statistics) = (self.profile.brake.port.clone(), self.brake.statistics());
-                    self.brake = Box::new(StandIn::lost(part, port, statistics));
+                    self.brake = Box::new(LostDevice::hung_up(device, port, statistics));
                     self.brake = self.dialer.brake(None).await?;
                     return Ok(self.brake.identify().await?.text);
                 }
@@ -188,12 +116,12 @@ impl Rig {
         }
     }
 
-    async fn call_servo_by_name(&mut self) -> Result<String, Halt> {
+    async fn call_servo_by_name(&mut self) -> Result<String, StopReason> {
         let said = self.servo.identify().await;
         let Err(error) = said else { return Ok(said?.text) };
         if hung_up(&error) {
             let (port, statistics) = (self.profile.servo.port.clone(), self.servo.statistics());
-            self.servo = Box::new(StandIn::lost(DeviceKind::Servo, port, statistics));
+            self.servo = Box::new(LostDevice::hung_up(DeviceKind::Servo, port, statistics));
             self.servo = self.dialer.servo(None).await?;
             return Ok(self.servo.identify().await?.text);
         }
@@ -201,7 +129,7 @@ impl Rig {
     }
 
     /// Calls a servo that was lost while it turned, and tells it to stop.
-    pub(super) async fn call_servo(&mut self) -> Result<(), Halt> {
+    pub(super) async fn call_servo(&mut self) -> Result<(), StopReason> {
         self.call_servo_by_name().await?;
         self.set_speed(None, 0.0).await?;
         self.lost[DeviceKind::Servo as usize] = false;

@@ -7,13 +7,14 @@ use gearmodel::measure::RunConditions;
 use riglog::proto::Level;
 use riglog::proto::Phase;
 
-use super::attend::Attendant;
-use super::halt::Halt;
+use super::admission::admit_job;
+use super::connected_rig::ConnectedRig;
 use super::job::{Job, Kind, RunSpec, Settle};
-use super::rig::Rig;
+use super::observer::RunObserver;
 use super::settle::SettleMonitor;
+use super::stop_reason::StopReason;
 use super::supervisor::Event;
-use crate::device::{CounterIdentity, DeviceError};
+use crate::device::{CounterIdentity, DeviceError, DeviceKind};
 
 /// Room on a serial line for a sample of both encoders: two bytes each at speed, and the frame's share.
 const BYTES_A_SAMPLE: f64 = 5.0;
@@ -21,17 +22,17 @@ const BYTES_A_SAMPLE: f64 = 5.0;
 /// Runs what is left of the job on a rig that is off. The caller switches off afterwards, whatever came back.
 ///
 /// # Errors
-/// [`Halt`] says why the job was not finished; [`Halt::Paused`] when a pause is due.
-pub async fn execute(rig: &mut Rig, job: &mut Job, attendant: &mut dyn Attendant) -> Result<(), Halt> {
+/// [`StopReason`] says why the job was not finished; [`StopReason::Paused`] when a pause is due.
+pub async fn execute(rig: &mut ConnectedRig, job: &mut Job, observer: &mut dyn RunObserver) -> Result<(), StopReason> {
     prepare(rig, job).await?;
     home(rig).await?;
     while let Some((index, run)) = job.current() {
-        heed_pause(rig)?;
+        check_pause(rig)?;
         if !job.is_partial() {
-            attendant.begins(rig, index, &run).await?;
+            observer.begins(rig, index, &run).await?;
         }
         approach(rig, &run, job.settle).await?;
-        heed_pause(rig)?;
+        check_pause(rig)?;
         let complete = if run.kind == Kind::WarmUp {
             warm_up(rig, &run).await?;
             true
@@ -41,30 +42,33 @@ pub async fn execute(rig: &mut Rig, job: &mut Job, attendant: &mut dyn Attendant
         };
         if complete {
             job.advance();
-            attendant.ended(rig, index, &run).await?;
+            observer.ended(rig, index, &run).await?;
         }
     }
     Ok(())
 }
 
-fn heed_pause(rig: &Rig) -> Result<(), Halt> {
-    if rig.stop.paused() { Err(Halt::Paused) } else { Ok(()) }
+fn check_pause(rig: &ConnectedRig) -> Result<(), StopReason> {
+    if rig.stop.paused() { Err(StopReason::Paused) } else { Ok(()) }
 }
 
-/// Identifies the devices, starts the encoders, and arms the drive's watchdog before it is enabled.
+/// Admits the job, identifies the devices, starts the encoders, and arms the drive's watchdog before it is enabled: whatever turns the
+/// motor comes through here.
 ///
 /// # Errors
-/// [`Halt`], among them [`DeviceError::NoWatchdog`] for a drive that has none.
-pub async fn prepare(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
-    meet(rig, job).await?;
+/// [`StopReason`], among them [`StopReason::Refused`] for a run beyond the profile's limits, and [`DeviceError::NoWatchdog`] for a drive that
+/// has none.
+pub async fn prepare(rig: &mut ConnectedRig, job: &Job) -> Result<(), StopReason> {
+    admit_job(&rig.profile, job)?;
+    identify_devices(rig, job).await?;
     // Last, for the drive's watchdog runs from here on.
     arm_watchdog(rig, job.accept_no_watchdog).await?;
     rig.heard = tokio::time::Instant::now();
     rig.set_speed(None, 0.0).await?;
-    rig.heed_stop()?;
+    rig.check_stop()?;
     let enabled = rig.servo.set_enabled(true).await;
     // It may be on even where that could not be confirmed; a stop then takes the longer way.
-    rig.tell(Event::ServoOn);
+    rig.apply_event(Event::ServoOn);
     rig.note(enabled)?;
     // Switching on takes its time and asks the drive all along.
     rig.heard = tokio::time::Instant::now();
@@ -74,14 +78,14 @@ pub async fn prepare(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
 /// Identifies the devices, starts the encoders and prepares the brake; the motor stays off.
 ///
 /// # Errors
-/// [`Halt`].
-pub async fn meet(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
+/// [`StopReason`].
+pub async fn identify_devices(rig: &mut ConnectedRig, job: &Job) -> Result<(), StopReason> {
     rig.enter(Phase::Idle);
     let servo = rig.servo.identify().await;
     let servo = rig.note(servo)?;
     let brake = rig.brake.identify().await;
     let brake = rig.note(brake)?;
-    let event = |rig: &Rig, text: String| rig.acquisition.borrow().event(Level::Info, "identity", text);
+    let event = |rig: &ConnectedRig, text: String| rig.acquisition.borrow().event(Level::Info, "identity", text);
     refuse_over_limit(rig, job).await?;
     // A counter that has gone on streaming while the rig was off is left alone.
     if let Some(mut counter) = rig.counter.take() {
@@ -106,14 +110,14 @@ pub async fn meet(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
 /// Until the encoders have sent something new.
 ///
 /// # Errors
-/// [`Halt::TooLong`] when they do not.
-pub async fn await_samples(rig: &mut Rig) -> Result<(), Halt> {
+/// [`StopReason::TooLong`] when they do not.
+pub async fn await_samples(rig: &mut ConnectedRig) -> Result<(), StopReason> {
     let before = rig.acquisition.borrow().samples();
     rig.until("the first encoder samples", 2.0, |acquisition| acquisition.samples() > before).await
 }
 
 /// Writes the drive's own watchdog and reads it back. A drive that has none is refused unless the operator accepts that.
-async fn arm_watchdog(rig: &mut Rig, accept_none: bool) -> Result<(), Halt> {
+async fn arm_watchdog(rig: &mut ConnectedRig, accept_none: bool) -> Result<(), StopReason> {
     let lease_s = rig.profile.sequence.lease_s;
     let (accel, decel) = (rig.profile.servo.accel_ms, rig.profile.servo.decel_ms);
     let prepared = rig.servo.prepare(accel, decel, Duration::from_secs_f64(lease_s)).await;
@@ -136,57 +140,57 @@ async fn arm_watchdog(rig: &mut Rig, accept_none: bool) -> Result<(), Halt> {
         tracing::warn!("{what}");
     }
     rig.acquisition.borrow().event(level, "lease", what);
-    rig.tell(Event::WatchdogKnown);
+    rig.apply_event(Event::WatchdogKnown);
     Ok(())
 }
 
 fn within(
-    device: &'static str,
+    device: DeviceKind,
     port: &str,
     quantity: &'static str,
     value: f64,
     limit: f64,
     unit: &'static str,
-) -> Result<(), Halt> {
+) -> Result<(), StopReason> {
     if value <= limit {
         return Ok(());
     }
-    Err(Halt::Device(DeviceError::Range { device, port: port.to_owned(), quantity, value, limit, unit }))
+    Err(StopReason::Device(DeviceError::Range { device, port: port.to_owned(), quantity, value, limit, unit }))
 }
 
 /// What the drives themselves allow, read back from them.
-async fn refuse_over_limit(rig: &mut Rig, job: &Job) -> Result<(), Halt> {
+async fn refuse_over_limit(rig: &mut ConnectedRig, job: &Job) -> Result<(), StopReason> {
     let allowed = rig.servo.max_motor_rpm().await;
     let allowed = rig.note(allowed)?;
     let asked = job.largest_speed_rpm().max(rig.profile.sequence.home_rpm) * rig.profile.servo.reduction;
-    within("servo", &rig.profile.servo.port, "motor speed", asked, allowed, "rpm")?;
+    within(DeviceKind::Servo, &rig.profile.servo.port, "motor speed", asked, allowed, "rpm")?;
     let current = rig.profile.brake.current_a(job.largest_load_nm()).unwrap_or(0.0);
-    within("brake", &rig.profile.brake.port, "coil current", current, rig.brake.max_current_a(), "A")
+    within(DeviceKind::Brake, &rig.profile.brake.port, "coil current", current, rig.brake.max_current_a(), "A")
 }
 
-fn refuse_rate(rig: &Rig, encoders: &CounterIdentity, rate_hz: f64) -> Result<(), Halt> {
+fn refuse_rate(rig: &ConnectedRig, encoders: &CounterIdentity, rate_hz: f64) -> Result<(), StopReason> {
     let counter = &rig.profile.counter;
     if encoders.own_rate {
         let what = format!("the encoders are sampled at {} Hz, their readers' own rate", encoders.max_rate_hz);
         rig.acquisition.borrow().event(Level::Info, "rate", what);
         return Ok(());
     }
-    within("counter", &counter.port, "sample rate", rate_hz, encoders.max_rate_hz, "Hz")?;
+    within(DeviceKind::Counter, &counter.port, "sample rate", rate_hz, encoders.max_rate_hz, "Hz")?;
     // A serial line carries a tenth of its baud rate in bytes; sockets and pipes have no such bound.
     if counter.port.starts_with('/') {
         let limit = f64::from(counter.baud) / 10.0 / BYTES_A_SAMPLE;
-        within("counter", &counter.port, "sample rate over its line", rate_hz, limit, "Hz")?;
+        within(DeviceKind::Counter, &counter.port, "sample rate over its line", rate_hz, limit, "Hz")?;
     }
     Ok(())
 }
 
 /// Turns ccw without load until both indices have passed; they are the zero of both angles.
-async fn home(rig: &mut Rig) -> Result<(), Halt> {
+async fn home(rig: &mut ConnectedRig) -> Result<(), StopReason> {
     rig.enter(Phase::Homing);
     let indexed = rig.acquisition.borrow().has_index();
     if !indexed {
         let homed = rig.acquisition.borrow_mut().home_without_index();
-        return if homed { Ok(()) } else { Err(Halt::ZeroLost { port: rig.profile.counter.port.clone() }) };
+        return if homed { Ok(()) } else { Err(StopReason::ZeroLost { port: rig.profile.counter.port.clone() }) };
     }
     let speed = rig.profile.sequence.home_rpm;
     rig.set_load(0.0).await?;
@@ -196,11 +200,11 @@ async fn home(rig: &mut Rig) -> Result<(), Halt> {
     let patience =
         rig.ramp_s(speed) + 60.0 / speed * 1.5 / rig.acquisition.borrow().analysis().model().pair.closure().min(1.0);
     let outcome = rig.until("homing", patience, |acquisition| acquisition.index_seen()).await;
-    if let Err(halt) = outcome {
+    if let Err(reason) = outcome {
         let missing = rig.acquisition.borrow().missing_index();
-        return Err(match (halt, missing) {
-            (Halt::TooLong { .. }, Some(which)) => Halt::NoIndex { which, turns: patience * speed / 60.0 },
-            (halt, _) => halt,
+        return Err(match (reason, missing) {
+            (StopReason::TooLong { .. }, Some(which)) => StopReason::NoIndex { which, turns: patience * speed / 60.0 },
+            (reason, _) => reason,
         });
     }
     rig.acquisition.borrow_mut().home();
@@ -208,7 +212,7 @@ async fn home(rig: &mut Rig) -> Result<(), Halt> {
 }
 
 /// Reverses if need be, brings the load up on the rising branch at speed, and waits until both stand.
-async fn approach(rig: &mut Rig, run: &RunSpec, settle: Option<Settle>) -> Result<(), Halt> {
+async fn approach(rig: &mut ConnectedRig, run: &RunSpec, settle: Option<Settle>) -> Result<(), StopReason> {
     rig.enter(Phase::Approach);
     let sense = run.direction.sign();
     let signed = move |speed: f64| speed * sense;
@@ -242,7 +246,7 @@ async fn approach(rig: &mut Rig, run: &RunSpec, settle: Option<Settle>) -> Resul
 }
 
 /// Waits until TE repeats from revolution to revolution, or the patience of the plan is over; the log says which.
-async fn settle_by_measurement(rig: &mut Rig, run: &RunSpec, settle: Settle) -> Result<(), Halt> {
+async fn settle_by_measurement(rig: &mut ConnectedRig, run: &RunSpec, settle: Settle) -> Result<(), StopReason> {
     let from = rig.acquisition.borrow().latest.theta1_rad;
     let mut monitor = SettleMonitor::new(settle, from);
     let longest = settle.turns_max * std::f64::consts::TAU;
@@ -267,18 +271,18 @@ async fn settle_by_measurement(rig: &mut Rig, run: &RunSpec, settle: Settle) -> 
 }
 
 /// Turns under load without recording.
-async fn warm_up(rig: &mut Rig, run: &RunSpec) -> Result<(), Halt> {
+async fn warm_up(rig: &mut ConnectedRig, run: &RunSpec) -> Result<(), StopReason> {
     let from = rig.acquisition.borrow().latest.theta1_rad;
     let turns = run.revolutions * std::f64::consts::TAU;
     let patience = 60.0 / run.speed_rpm * (run.revolutions + 0.2) * 1.2 + 2.0;
     let stop = rig.stop.clone();
     rig.until("warming up", patience, move |a| stop.paused() || (a.latest.theta1_rad - from).abs() >= turns).await?;
     // An interrupted warm-up is done again, for meanwhile the rig has cooled.
-    heed_pause(rig)
+    check_pause(rig)
 }
 
 /// Records whole revolutions: as many as are wanted, or up to the end of the one in which a pause was asked for.
-async fn record(rig: &mut Rig, run: &RunSpec, revolutions: f64) -> Result<f64, Halt> {
+async fn record(rig: &mut ConnectedRig, run: &RunSpec, revolutions: f64) -> Result<f64, StopReason> {
     let conditions = RunConditions { direction: run.direction, load_nm: run.load_nm, speed_rpm: run.speed_rpm };
     rig.acquisition.borrow_mut().arm(conditions, revolutions);
     let patience = 60.0 / run.speed_rpm * (revolutions + 0.2) * 1.2 + 2.0;

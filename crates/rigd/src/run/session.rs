@@ -2,10 +2,8 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use std::task::Poll;
 
 use gearmodel::NominalModel;
 use nix::libc::SIGXFSZ;
@@ -13,55 +11,36 @@ use riglog::proto::{Level, Phase};
 use riglog::{LogError, RunMetadata, WriterOptions};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::Plan;
 use super::acquire::Acquisition;
-use super::attend::{Attendant, Nobody, Policy, attend};
-use super::halt::Halt;
+use super::connected_rig::{ConnectedRig, Devices};
+use super::dialer::{Dialer, Redial};
 use super::job::Job;
+use super::observer::RunObserver;
+use super::panic::survive;
+use super::plan::RunPlan;
 use super::progress::Progress;
-use super::reconnect::{Dialer, Redial};
 use super::recorder::{Entry, Recorder};
-use super::rig::{Devices, Rig};
+use super::run_job::{Policy, run_job};
 use super::stop::StopRequests;
+use super::stop_reason::StopReason;
 use super::supervisor::Event;
 use crate::analysis::Analysis;
 use crate::clock::Clock;
+use crate::device::DeviceKind;
 use crate::device::bus::BusStatistics;
-use crate::device::{self, UnknownDriver};
+use crate::device::drivers::{self, UnknownDriver};
 use crate::link::Link;
 use crate::profile::Profile;
 
 /// This program, as logs name it.
 const SOFTWARE: &str = concat!("rigd ", env!("CARGO_PKG_VERSION"));
 
-/// What a session needs.
-pub struct Setup {
-    /// What to measure.
-    pub plan: Plan,
-    /// The rig.
-    pub profile: Profile,
-    /// The model in force.
-    pub model: NominalModel,
-    /// `pair.toml` as it was given, for the log.
-    pub pair_toml: String,
-    /// Where the log goes.
-    pub path: PathBuf,
-    /// For the log.
-    pub operator: String,
-    /// For the log.
-    pub note: String,
-    /// No progress line.
-    pub quiet: bool,
-    /// What is waited for instead of ending.
-    pub policy: Policy,
-}
-
 /// What came of a session.
 pub struct Outcome {
     /// TE and backlash of what was recorded.
     pub analysis: Analysis,
     /// Why it ended before its time.
-    pub halt: Option<Halt>,
+    pub stop_reason: Option<StopReason>,
     /// What went wrong while switching off or finalising.
     pub troubles: Vec<String>,
     /// Samples that never arrived, and samples of the whole log.
@@ -89,68 +68,58 @@ pub struct Links {
     pub again: Option<Redial>,
 }
 
-/// Runs a session. Only what prevents the log itself is an error; everything later is in the outcome.
-///
-/// # Errors
-/// [`LogError`] when the log cannot be made.
-pub async fn run(setup: Setup, links: Links, clock: Clock, stop: StopRequests) -> Result<Outcome, LogError> {
-    let recorder = Recorder::create(&setup.path, writer_options(&setup.profile), &setup.profile.log)?;
-    let log = LogHead {
-        operator: setup.operator.clone(),
-        note: setup.note.clone(),
-        pair_toml: setup.pair_toml.clone(),
-        plan_toml: None,
-    };
-    let directions: Vec<_> = setup.plan.directions.iter().map(ToString::to_string).collect();
-    let conditions = RunMetadata {
-        direction: directions.join(","),
-        load_nm: setup.plan.loads_nm.clone(),
-        speed_rpm: vec![setup.plan.speed_rpm],
-        revolutions: Some(setup.plan.revolutions),
-        ..RunMetadata::default()
-    };
-    log.describe(&recorder, &setup.profile, conditions, clock);
-    let work = Work {
-        profile: setup.profile,
-        model: setup.model,
-        job: Job::of(&setup.plan),
-        policy: setup.policy,
-        quiet: setup.quiet,
-    };
-    Ok(conduct(work, recorder, &mut Nobody, links, clock, stop).await)
-}
-
-/// A job and the rig to do it on.
-pub struct Work {
+/// A rig, and what the log says of the work on it.
+pub struct RunConfig {
+    /// Where the log goes.
+    pub path: PathBuf,
     /// The rig.
     pub profile: Profile,
     /// The model in force.
     pub model: NominalModel,
-    /// The runs.
-    pub job: Job,
-    /// What is waited for instead of ending.
-    pub policy: Policy,
+    /// Operator, note and pair.
+    pub head: LogHead,
+    /// Senses, loads and speeds.
+    pub conditions: RunMetadata,
     /// No progress line.
     pub quiet: bool,
 }
 
+impl RunConfig {
+    /// Makes the log, before anything is connected; `revolutions` are what the progress line goes up to.
+    ///
+    /// # Errors
+    /// [`LogError`] when the log cannot be made.
+    pub fn begin(
+        self,
+        revolutions: f64,
+        links: Links,
+        clock: Clock,
+        stop: StopRequests,
+    ) -> Result<SessionContext, LogError> {
+        let Self { path, profile, model, head, conditions, quiet } = self;
+        let recorder = Recorder::create(&path, writer_options(&profile), &profile.log)?;
+        head.describe(&recorder, &profile, conditions, clock);
+        let progress = Progress::new(revolutions, quiet);
+        Ok(SessionContext { profile, model, recorder, progress, links, clock, stop })
+    }
+}
+
+/// What is to be run, and how it goes on where it is interrupted.
+pub struct JobSpec {
+    /// The runs.
+    pub job: Job,
+    /// What is waited for instead of ending.
+    pub policy: Policy,
+}
+
 /// Connects, does the job, switches off, and finalises the log that is then being written.
-pub async fn conduct(
-    work: Work,
-    recorder: Recorder,
-    attendant: &mut dyn Attendant,
-    links: Links,
-    clock: Clock,
-    stop: StopRequests,
-) -> Outcome {
-    let Work { profile, model, mut job, policy, quiet } = work;
-    let progress = Progress::new(job.revolutions(), quiet);
-    let frame = Frame { profile, model, recorder, progress, links, clock, stop };
-    with_rig(frame, async |rig| attend(rig, &mut job, policy, attendant).await).await
+pub async fn execute_job(context: SessionContext, spec: JobSpec, observer: &mut dyn RunObserver) -> Outcome {
+    let JobSpec { mut job, policy } = spec;
+    with_rig(context, async |rig| run_job(rig, &mut job, policy, observer).await).await
 }
 
 /// What a session on the rig needs, whatever is done in it.
-pub struct Frame {
+pub struct SessionContext {
     /// The rig.
     pub profile: Profile,
     /// The model in force.
@@ -167,17 +136,20 @@ pub struct Frame {
     pub stop: StopRequests,
 }
 
-/// Connects, lets `body` do its work, which leaves the rig off, and finalises the log that is then being written. [`attend`] is a body;
+/// Connects, lets `body` do its work, which leaves the rig off, and finalises the log that is then being written. [`run_job`] is a body;
 /// so is [`once`] around anything else.
-pub async fn with_rig(frame: Frame, body: impl AsyncFnOnce(&mut Rig) -> (Option<Halt>, Vec<String>)) -> Outcome {
+pub async fn with_rig(
+    context: SessionContext,
+    body: impl AsyncFnOnce(&mut ConnectedRig) -> (Option<StopReason>, Vec<String>),
+) -> Outcome {
     let _size_limit = outlive_size_limit();
-    let Frame { profile, model, recorder, progress, links, clock, stop } = frame;
+    let SessionContext { profile, model, recorder, progress, links, clock, stop } = context;
     let acquisition = Rc::new(RefCell::new(Acquisition::new(recorder, clock, Analysis::new(model))));
     let dialer = Dialer::new(profile.clone(), links.again.clone());
     let mut lines = BTreeMap::new();
-    let (halt, mut troubles) = match connect(&dialer, links).await {
+    let (reason, mut troubles) = match connect(&dialer, links).await {
         Ok(devices) => {
-            let mut rig = Rig::new(profile, devices, dialer, Rc::clone(&acquisition), clock, stop, progress);
+            let mut rig = ConnectedRig::new(profile, devices, dialer, Rc::clone(&acquisition), clock, stop, progress);
             let outcome = body(&mut rig).await;
             lines.extend(statistics(&rig));
             leave(rig, outcome).await
@@ -198,37 +170,43 @@ pub async fn with_rig(frame: Frame, body: impl AsyncFnOnce(&mut Rig) -> (Option<
     let (recorder, analysis) = acquisition.into_parts();
     let late_failure = recorder.take_failure();
     let unwritten = recorder.unwritten();
-    let mut halt = halt.or(late_failure.map(Halt::Log));
+    let mut reason = reason.or(late_failure.map(StopReason::Log));
     let mut finalised = true;
     if let Err(error) = recorder.finish() {
         finalised = false;
-        if halt.is_none() {
-            halt = Some(Halt::Log(error));
+        if reason.is_none() {
+            reason = Some(StopReason::Log(error));
         } else {
             troubles.push(format!("the log could not be finalised: {error}"));
         }
     }
-    Outcome { analysis, halt, troubles, lost, unwritten, finalised, lines, time_skew }
+    Outcome { analysis, stop_reason: reason, troubles, lost, unwritten, finalised, lines, time_skew }
 }
 
 /// Does some work on the rig once, and switches off whatever came of it, a panic too.
-pub async fn once(rig: &mut Rig, work: impl AsyncFnOnce(&mut Rig) -> Result<(), Halt>) -> (Option<Halt>, Vec<String>) {
-    let halt = survive(work(&mut *rig)).await.err();
-    if let Some(halt) = &halt {
-        rig.acquisition.borrow().event(Level::Error, "halt", halt.to_string());
+pub async fn once(
+    rig: &mut ConnectedRig,
+    work: impl AsyncFnOnce(&mut ConnectedRig) -> Result<(), StopReason>,
+) -> (Option<StopReason>, Vec<String>) {
+    let reason = survive(work(&mut *rig)).await.err();
+    if let Some(reason) = &reason {
+        rig.acquisition.borrow().event(Level::Error, "halt", reason.to_string());
     }
-    let troubles = rig.switch_off(halt.as_ref().map_or(Event::Finished, Halt::event)).await;
-    (halt, troubles)
+    let troubles = rig.switch_off(reason.as_ref().map_or(Event::Finished, StopReason::event)).await;
+    (reason, troubles)
 }
 
 /// What happened on the devices' lines.
-fn statistics(rig: &Rig) -> [(&'static str, BusStatistics); 2] {
+fn statistics(rig: &ConnectedRig) -> [(&'static str, BusStatistics); 2] {
     [("servo", rig.servo.statistics()), ("brake", rig.brake.statistics())]
 }
 
 /// Leaves a rig that is off: ends the stream, and says what the lines were like.
-pub async fn leave(mut rig: Rig, outcome: (Option<Halt>, Vec<String>)) -> (Option<Halt>, Vec<String>) {
-    let (halt, mut troubles) = outcome;
+pub async fn leave(
+    mut rig: ConnectedRig,
+    outcome: (Option<StopReason>, Vec<String>),
+) -> (Option<StopReason>, Vec<String>) {
+    let (reason, mut troubles) = outcome;
     troubles.extend(rig.end_stream().await);
     rig.enter(Phase::Idle);
     for (device, line) in statistics(&rig) {
@@ -236,22 +214,8 @@ pub async fn leave(mut rig: Rig, outcome: (Option<Halt>, Vec<String>)) -> (Optio
     }
     rig.progress.finish();
     // A stop that came while the rig was stopping by itself was a stop all the same.
-    let halt = halt.or_else(|| rig.heed_stop().err());
-    (halt, troubles)
-}
-
-/// Makes a panic of the sequence a reason to switch off in order, as any other.
-pub async fn survive(sequence: impl Future<Output = Result<(), Halt>>) -> Result<(), Halt> {
-    let mut sequence = std::pin::pin!(sequence);
-    std::future::poll_fn(|context| {
-        // The rig is only switched off afterwards, from whatever state it is in.
-        catch_unwind(AssertUnwindSafe(|| sequence.as_mut().poll(context))).unwrap_or_else(|panic| {
-            let what = panic.downcast_ref::<&str>().map(ToString::to_string);
-            let what = what.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
-            Poll::Ready(Err(Halt::Panic { what }))
-        })
-    })
-    .await
+    let reason = reason.or_else(|| rig.check_stop().err());
+    (reason, troubles)
 }
 
 /// A log that reaches the process's file size limit (`ulimit -f`) shall be an error of the write and a stop in order; unhandled, the
@@ -315,8 +279,8 @@ pub fn writer_options(profile: &Profile) -> WriterOptions {
 /// Opens the three devices.
 ///
 /// # Errors
-/// [`Halt::Link`], [`Halt::Driver`].
-pub async fn connect(dialer: &Dialer, links: Links) -> Result<Devices, Halt> {
+/// [`StopReason::Link`], [`StopReason::Driver`].
+pub async fn connect(dialer: &Dialer, links: Links) -> Result<Devices, StopReason> {
     Ok(Devices {
         servo: dialer.servo(links.servo).await?,
         brake: dialer.brake(links.brake).await?,
@@ -329,15 +293,15 @@ pub async fn connect(dialer: &Dialer, links: Links) -> Result<Devices, Halt> {
 /// # Errors
 /// [`UnknownDriver`] lists those that there are.
 pub fn check_drivers(profile: &Profile) -> Result<(), UnknownDriver> {
-    device::find(device::SERVOS, "servo", &profile.servo.driver)?;
-    device::find(device::BRAKES, "brake", &profile.brake.driver)?;
-    device::find(device::COUNTERS, "counter", &profile.counter.driver)?;
+    drivers::find(drivers::SERVOS, DeviceKind::Servo, &profile.servo.driver)?;
+    drivers::find(drivers::BRAKES, DeviceKind::Brake, &profile.brake.driver)?;
+    drivers::find(drivers::COUNTERS, DeviceKind::Counter, &profile.counter.driver)?;
     Ok(())
 }
 
 /// A log's path: start, senses, load and speed in its name; never one that exists.
 #[must_use]
-pub fn log_path(directory: &Path, plan: &Plan) -> PathBuf {
+pub fn log_path(directory: &Path, plan: &RunPlan) -> PathBuf {
     let senses: Vec<_> = plan.directions.iter().map(ToString::to_string).collect();
     let loads: Vec<_> = plan.loads_nm.iter().map(|load| format!("{load}Nm")).collect();
     let loads = if loads.len() > 3 { format!("{}-{}", loads[0], loads[loads.len() - 1]) } else { loads.join("-") };
@@ -352,21 +316,4 @@ pub fn free_path(directory: &Path, what: &str) -> PathBuf {
         .map(|n| directory.join(if n == 0 { format!("{stem}.mcap") } else { format!("{stem}_{n}.mcap") }))
         .find(|path| !path.exists())
         .unwrap_or_else(|| directory.join(format!("{stem}.mcap")))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[tokio::test]
-    async fn a_panic_is_a_halt_with_its_message() {
-        let outcome = survive(async {
-            tokio::task::yield_now().await;
-            panic!("no such {}", "thing")
-        })
-        .await;
-        assert!(matches!(outcome, Err(Halt::Panic { what }) if what == "no such thing"));
-        assert!(survive(async { Ok(()) }).await.is_ok());
-        assert!(matches!(survive(async { Err(Halt::Operator) }).await, Err(Halt::Operator)));
-    }
 }

@@ -7,11 +7,13 @@ use gearmodel::Direction;
 use riglog::proto::{Level, Phase};
 use tokio::time::Instant;
 
-use super::Plan;
-use super::halt::Halt;
+use super::admission::{Terms, admit_load};
+use super::connected_rig::ConnectedRig;
 use super::job::Job;
-use super::rig::Rig;
+use super::limits::{Exceeded, Limit};
+use super::plan::RunPlan;
 use super::sequence;
+use super::stop_reason::StopReason;
 
 /// Fastest turning for set-up, rpm of the driver: slow enough to jump clear.
 pub const LARGEST_RPM: f64 = 10.0;
@@ -43,9 +45,9 @@ pub struct Jog {
 /// Turns slowly until the turns or the time are over; `from_rad` takes θ1 at the start. The caller switches off.
 ///
 /// # Errors
-/// [`Halt`], among them [`Halt::Operator`] when the operator has seen enough, [`Halt::Limit`] when the shaft turns faster than asked
-/// for, and [`Halt::TooLong`] when it does not turn.
-pub async fn jog(rig: &mut Rig, jog: Jog, from_rad: &Cell<f64>) -> Result<(), Halt> {
+/// [`StopReason`], among them [`StopReason::Operator`] when the operator has seen enough, [`StopReason::Limit`] when the shaft turns faster than asked
+/// for, and [`StopReason::TooLong`] when it does not turn.
+pub async fn jog(rig: &mut ConnectedRig, jog: Jog, from_rad: &Cell<f64>) -> Result<(), StopReason> {
     let mut job = Job::of(&idle_plan(vec![jog.direction], 0.0, jog.speed_rpm));
     job.accept_no_watchdog = jog.accept_no_watchdog;
     sequence::prepare(rig, &job).await?;
@@ -65,18 +67,12 @@ pub async fn jog(rig: &mut Rig, jog: Jog, from_rad: &Cell<f64>) -> Result<(), Ha
         fast = if speed_rpm > jog.speed_rpm * TOO_FAST { fast + 1 } else { 0 };
         slow = if elapsed_s > ramp_s && speed_rpm < jog.speed_rpm * TOO_SLOW { slow + 1 } else { 0 };
         if fast >= FAST_POLLS {
-            return Err(Halt::Limit {
-                quantity: "driver speed",
-                value: speed_rpm,
-                limit: jog.speed_rpm * TOO_FAST,
-                unit: "rpm",
-                key: "one and a half times --rpm",
-                advice: "check servo.reduction and the encoder's lines",
-            });
+            let exceeded = Exceeded { limit: Limit::SetUpSpeed, value: speed_rpm, allowed: jog.speed_rpm * TOO_FAST };
+            return Err(StopReason::Limit(exceeded));
         }
         if slow >= SLOW_POLLS {
             let now = format!("{speed_rpm:.2} rpm");
-            return Err(Halt::TooLong { what: "turning at the speed asked for", seconds: elapsed_s, now });
+            return Err(StopReason::TooLong { what: "turning at the speed asked for", seconds: elapsed_s, now });
         }
         if elapsed_s >= jog.seconds || jog.turns.is_some_and(|turns| turned_rad >= turns * TAU) {
             return Ok(());
@@ -87,9 +83,10 @@ pub async fn jog(rig: &mut Rig, jog: Jog, from_rad: &Cell<f64>) -> Result<(), Ha
 /// Holds a load at the driven gear with the motor off, until the time is over. The caller sets the brake to zero.
 ///
 /// # Errors
-/// [`Halt`], among them [`Halt::Operator`], and [`Halt::Limit`] when somebody turns the gear for longer than the brake's heat allows.
-pub async fn hold_brake(rig: &mut Rig, load_nm: f64, seconds: f64) -> Result<(), Halt> {
-    sequence::meet(rig, &Job::of(&idle_plan(vec![Direction::Ccw], load_nm, 0.0))).await?;
+/// [`StopReason`], among them [`StopReason::Operator`], and [`StopReason::Limit`] when somebody turns the gear for longer than the brake's heat allows.
+pub async fn hold_brake(rig: &mut ConnectedRig, load_nm: f64, seconds: f64) -> Result<(), StopReason> {
+    admit_load(&rig.profile, Terms::SET_POINTS, load_nm)?;
+    sequence::identify_devices(rig, &Job::of(&idle_plan(vec![Direction::Ccw], load_nm, 0.0))).await?;
     sequence::await_samples(rig).await?;
     rig.enter(Phase::Approach);
     rig.set_load(load_nm).await?;
@@ -100,8 +97,8 @@ pub async fn hold_brake(rig: &mut Rig, load_nm: f64, seconds: f64) -> Result<(),
 }
 
 /// Nothing is recorded; this is what the drives are asked whether they can do.
-fn idle_plan(directions: Vec<Direction>, load_nm: f64, speed_rpm: f64) -> Plan {
-    Plan {
+fn idle_plan(directions: Vec<Direction>, load_nm: f64, speed_rpm: f64) -> RunPlan {
+    RunPlan {
         directions,
         loads_nm: vec![load_nm],
         speed_rpm,

@@ -6,8 +6,8 @@ use std::time::Duration;
 use riglog::proto::{Level, Phase};
 use tokio::time::{Instant, sleep};
 
-use super::halt::Halt;
-use super::rig::Rig;
+use super::connected_rig::ConnectedRig;
+use super::stop_reason::StopReason;
 use super::supervisor::{Action, Event, State};
 use crate::device::DeviceKind;
 
@@ -31,7 +31,7 @@ struct Stopping {
 }
 
 impl Stopping {
-    fn trouble(&mut self, rig: &Rig, what: String) {
+    fn trouble(&mut self, rig: &ConnectedRig, what: String) {
         if !self.troubles.contains(&what) {
             rig.acquisition.borrow().event(Level::Error, "stop", what.clone());
             self.troubles.push(what);
@@ -39,7 +39,7 @@ impl Stopping {
     }
 }
 
-impl Rig {
+impl ConnectedRig {
     /// Switches off for a reason. Every step is tried whatever became of the one before; returns what went wrong on the way.
     pub async fn switch_off(&mut self, reason: Event) -> Vec<String> {
         debug_assert!(reason.is_stop(), "{reason:?} is no reason to stop");
@@ -184,7 +184,7 @@ impl Rig {
             return Some(Event::HeatSpent);
         }
         if Instant::now() >= stop.next_call {
-            let called: Result<(), Halt> = self.call_servo().await;
+            let called: Result<(), StopReason> = self.call_servo().await;
             stop.next_call = Instant::now() + CALL_PERIOD;
             if called.is_ok() {
                 return Some(Event::ServoBack);

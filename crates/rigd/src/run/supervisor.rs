@@ -216,5 +216,4 @@ pub fn table() -> String {
 }
 
 #[cfg(test)]
-#[path = "supervisor_tests.rs"]
 mod tests;

@@ -9,7 +9,7 @@ use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use thiserror::Error;
 
-use crate::cli::stop;
+use crate::run::registry;
 
 /// Why a wish is not granted.
 #[derive(Debug, Error)]
@@ -55,7 +55,7 @@ impl Control {
     /// # Errors
     /// [`ControlError::NoRun`].
     pub fn stop(&self) -> Result<Value, ControlError> {
-        match stop::signal_runs(Signal::SIGINT, |_| true) {
+        match registry::signal_runs(Signal::SIGINT, |_| true) {
             0 => Err(ControlError::NoRun),
             runs => Ok(json!({"stopping": runs})),
         }
@@ -66,10 +66,10 @@ impl Control {
     /// # Errors
     /// [`ControlError::NoRun`], or [`ControlError::NotPausable`] for a run that does not know the signal, which would kill it.
     pub fn pause(&self) -> Result<Value, ControlError> {
-        if stop::runs().is_empty() {
+        if registry::runs().is_empty() {
             return Err(ControlError::NoRun);
         }
-        match stop::signal_runs(Signal::SIGUSR1, |pid| catches(pid, Signal::SIGUSR1)) {
+        match registry::signal_runs(Signal::SIGUSR1, |pid| catches(pid, Signal::SIGUSR1)) {
             0 => Err(ControlError::NotPausable),
             runs => Ok(json!({"pausing": runs})),
         }
@@ -100,7 +100,7 @@ impl Control {
         let name = self.plans().into_iter().find(|name| name == plan).ok_or(ControlError::UnknownPlan)?;
         let mut started = self.started.lock().unwrap_or_else(PoisonError::into_inner);
         let running = started.as_mut().is_some_and(|(_, child)| matches!(child.try_wait(), Ok(None)));
-        if running || !stop::runs().is_empty() {
+        if running || !registry::runs().is_empty() {
             return Err(ControlError::Busy);
         }
         let mut command = Command::new(&self.program);

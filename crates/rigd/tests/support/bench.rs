@@ -9,10 +9,12 @@ use gearmodel::Direction;
 use rigd::analysis::Analysis;
 use rigd::clock::Clock;
 use rigd::profile::Profile;
-use rigd::run::attend::{Nobody, Policy};
 use rigd::run::job::{Job, Kind, RunSpec};
+use rigd::run::observer::NoObserver;
+use rigd::run::progress::Progress;
 use rigd::run::recorder::Recorder;
-use rigd::run::session::{self, LogHead, Outcome, Work};
+use rigd::run::run_job::Policy;
+use rigd::run::session::{self, JobSpec, LogHead, Outcome, SessionContext};
 use rigd::run::stop::StopRequests;
 use rigd::{replay, simulated};
 use riglog::pair;
@@ -82,12 +84,23 @@ impl Bench {
         recorder
     }
 
+    /// What a session on this rig needs.
+    pub fn context(&self, revolutions: f64) -> SessionContext {
+        let (_, model) = pair::load(None).expect("the built-in pair");
+        SessionContext {
+            profile: self.profile.clone(),
+            model,
+            recorder: self.recorder(),
+            progress: Progress::new(revolutions, true),
+            links: simulated::links_to(&self.world),
+            clock: self.clock,
+            stop: self.stop.clone(),
+        }
+    }
+
     /// Does a job through real drivers and bytes.
     pub async fn run(&self, job: Job, policy: Policy) -> Outcome {
-        let (_, model) = pair::load(None).expect("the built-in pair");
-        let work = Work { profile: self.profile.clone(), model, job, policy, quiet: true };
-        let links = simulated::links_to(&self.world);
-        session::conduct(work, self.recorder(), &mut Nobody, links, self.clock, self.stop.clone()).await
+        session::execute_job(self.context(job.revolutions()), JobSpec { job, policy }, &mut NoObserver).await
     }
 
     /// Until the shafts turn under load at speed, and a while.

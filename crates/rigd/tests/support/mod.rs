@@ -14,7 +14,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use rigd::device::bus::{Bus, Manners};
+use rigd::device::DeviceKind;
+use rigd::device::bus::{Bus, BusTiming};
 use rigd::link::Address;
 use rigd::profile::Profile;
 use riglog::proto::Phase;
@@ -193,10 +194,12 @@ impl Sim {
     pub fn servo(&self) -> Servo {
         let profile = Profile::load(&self.port("profile.toml")).expect("its own profile").servo;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
-        let address = Address { device: "servo", port: profile.port, baud: profile.baud, format: profile.format };
+        let address =
+            Address { device: DeviceKind::Servo, port: profile.port, baud: profile.baud, format: profile.format };
         let link = runtime.block_on(address.open()).expect("the port opens again");
-        let manners = Manners { silence: Duration::from_millis(10), patience: Duration::from_millis(200), attempts: 3 };
-        Servo { bus: Bus::new(link, address, profile.unit, manners), runtime }
+        let timing =
+            BusTiming { silence: Duration::from_millis(10), patience: Duration::from_millis(200), attempts: 3 };
+        Servo { bus: Bus::new(link, address, profile.unit, timing), runtime }
     }
 }
 

@@ -5,12 +5,12 @@ use std::{
     path::Path,
 };
 
-use super::{RunVisitor, SampleBlock, StreamTotals};
 use crate::{
     completeness::Completeness,
     error::LogError,
     metadata::{AngleScale, EncoderMetadata},
     proto::AngleBatch,
+    run_visitor::{RunVisitor, SampleBlock, StreamTotals},
     runs::{RunSpan, RunTotals},
 };
 

@@ -2,8 +2,9 @@
 
 use thiserror::Error;
 
-use super::frame::{Ack, AckStatus, BoxStatus, Command, Frame, Identity, SampleFlags, Samples};
+use super::frame::{Ack, AckStatus, BoxStatus, Command, Frame, Identity};
 use super::{MAX_SAMPLES_PER_FRAME, MAX_TEXT, kind, varint};
+use crate::samples::{SampleFlags, Samples};
 
 /// A frame with a good CRC whose body is not what its type says.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]

@@ -2,8 +2,9 @@
 
 use thiserror::Error;
 
-use super::frame::{Ack, Command, Frame, Identity, Samples};
+use super::frame::{Ack, Command, Frame, Identity};
 use super::{CRC, MAX_SAMPLES_PER_FRAME, MAX_TEXT, SAMPLES_HEAD, kind, varint};
+use crate::samples::Samples;
 
 /// A message that the format cannot carry.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]

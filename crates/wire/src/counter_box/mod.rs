@@ -9,10 +9,11 @@ mod encode;
 mod frame;
 mod varint;
 
+pub use crate::samples::{SampleFlags, Samples};
 pub use body::MalformedFrame;
 pub use decode::{StreamDecoder, StreamStats};
 pub use encode::{EncodeError, Encoder};
-pub use frame::{Ack, AckStatus, BoxStatus, Command, Frame, Identity, RequestId, SampleFlags, Samples};
+pub use frame::{Ack, AckStatus, BoxStatus, Command, Frame, Identity, RequestId};
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 

@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 use super::figures::{Figures, name};
 use super::{AnalyseError, Run};
 use crate::chart::{Axis, Chart, Ink, Mark, Panel, Scale, Series};
-use crate::cli::model::output::{Extra, OutputError, Report};
+use crate::cli::model::error::OutputError;
+use crate::cli::model::output::{Extra, Report};
 use crate::cli::model::table::{Column, Table};
 use crate::present::{angle, arcsec};
 

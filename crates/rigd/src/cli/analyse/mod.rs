@@ -12,7 +12,8 @@ use gearmodel::measure::{AngleGrid, MeasureError, OrderAxis, RunConditions, RunT
 use riglog::{LogError, LogParts, RunSpan, RunStream, RunTotals, RunVisitor, SampleBlock};
 use thiserror::Error;
 
-use super::model::output::{Output, OutputError};
+use super::model::error::OutputError;
+use super::model::output::Output;
 use super::recorded::Recorded;
 use super::{Exit, fail};
 use crate::replay::{ReplayError, model_for};

@@ -4,23 +4,24 @@ use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
 
+use gearmodel::Direction;
 use gearmodel::calibration::{BrakePoint, COVERAGE, Stated, brake_curves};
-use gearmodel::{Direction, NominalModel};
 use riglog::RunMetadata;
 use serde_json::json;
 
-use super::super::on_rig::{OnRig, on_rig};
-use super::super::{Exit, fail, stop};
+use super::super::on_rig::on_rig;
+use super::super::{Exit, fail};
 use super::{Output, date};
 use crate::calibration::{BrakeCalibration, Calibration};
-use crate::profile::{Profile, SLOWEST_RPM};
+use crate::profile::Profile;
 use crate::quantity::{SPEED, TORQUE};
-use crate::run::Plan;
+use crate::run::admission::{Terms, admit_heat, admit_speed};
 use crate::run::brake_sweep::{self, SweepPlan, Swept};
-use crate::run::halt::Halt;
-use crate::run::limits::slip_power_w;
-use crate::run::rig::Rig;
-use crate::run::session::{self, LogHead, Outcome};
+use crate::run::connected_rig::ConnectedRig;
+use crate::run::plan::RunPlan;
+use crate::run::registry::Running;
+use crate::run::session::{self, LogHead, Outcome, RunConfig};
+use crate::run::stop_reason::StopReason;
 use riglog::pair;
 
 /// Sampling while the torque is what counts, Hz.
@@ -72,36 +73,24 @@ pub struct Args {
     output: Output,
 }
 
-/// A rig, and where the log of its calibration goes.
-struct Setup {
-    path: PathBuf,
-    profile: Profile,
-    model: NominalModel,
-    head: LogHead,
-}
-
 /// What is refused before anything moves.
 #[derive(Debug, thiserror::Error)]
 enum Refusal {
     #[error("{option} {value} {unit} must be {expected}")]
     Value { option: &'static str, value: f64, unit: &'static str, expected: String },
-    #[error(
-        "limits.load_nm {load_nm} N·m at --rpm {speed_rpm} makes {power_w:.0} W of heat in the brake, over its {limit_w} W (limits.slip_power_w); lower --rpm, or --max-current with a smaller limits.load_nm"
-    )]
-    TooHot { load_nm: f64, speed_rpm: f64, power_w: f64, limit_w: f64 },
 }
 
 /// Runs the command.
 pub fn main(args: &Args) -> Exit {
-    let (setup, plan) = match prepare(args) {
+    let (config, plan) = match prepare(args) {
         Ok(prepared) => prepared,
         Err(error) => return fail(Exit::BadInput, error.as_ref()),
     };
-    let rig = setup.profile.clone();
-    let mean_ratio = setup.model.pair.closure();
-    let running = stop::Running::register();
+    let rig = config.profile.clone();
+    let mean_ratio = config.model.pair.closure();
+    let running = Running::register();
     let swept = Rc::new(RefCell::new(Swept::default()));
-    let outcome = execute(args, setup, &plan, &swept);
+    let outcome = execute(args, config, &plan, &swept);
     drop(running);
     match outcome {
         Err(error) => {
@@ -110,16 +99,16 @@ pub fn main(args: &Args) -> Exit {
         }
         Ok(outcome) => {
             outcome.troubles.iter().for_each(|trouble| eprintln!("error: {trouble}"));
-            match &outcome.halt {
-                Some(halt @ Halt::Operator) => fail(Exit::Stopped, halt),
-                Some(halt) => fail(Exit::Halted, halt),
+            match &outcome.stop_reason {
+                Some(reason @ StopReason::Operator) => fail(Exit::Stopped, reason),
+                Some(reason) => fail(Exit::Halted, reason),
                 None => conclude(args, &rig, &plan, mean_ratio, &swept.borrow()),
             }
         }
     }
 }
 
-fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>> {
+fn prepare(args: &Args) -> Result<(RunConfig, SweepPlan), Box<dyn std::error::Error>> {
     let profile = match &args.profile {
         Some(path) => Profile::load(path)?,
         None => Profile::simulated(),
@@ -133,20 +122,15 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
         let expected = format!("over 0 and at most brake.current_limit_a = {}", profile.brake.current_limit_a);
         refuse("--max-current", max_a, "A", expected)?;
     }
-    if !(SLOWEST_RPM..=limits.speed_rpm).contains(&args.rpm) {
-        refuse("--rpm", args.rpm, "rpm", format!("from {SLOWEST_RPM} to limits.speed_rpm = {}", limits.speed_rpm))?;
-    }
+    let terms = Terms { load: "limits.load_nm", ..Terms::OPTIONS };
+    admit_speed(&profile, terms, args.rpm)?;
     if !(0.0..=50.0).contains(&args.torque_uncertainty) {
         refuse("--torque-uncertainty", args.torque_uncertainty, "%", "from 0 to 50".into())?;
     }
     if args.rated_torque <= 0.0 {
         refuse("--rated-torque", args.rated_torque, "N·m", "over 0".into())?;
     }
-    let power_w = slip_power_w(limits.load_nm, args.rpm);
-    if power_w > limits.slip_power_w {
-        let (load_nm, limit_w) = (limits.load_nm, limits.slip_power_w);
-        return Err(Box::new(Refusal::TooHot { load_nm, speed_rpm: args.rpm, power_w, limit_w }));
-    }
+    admit_heat(&profile, terms, limits.load_nm, args.rpm)?;
     std::fs::create_dir_all(&args.logs)?;
     let (pair_toml, model) = pair::load(None)?;
     let sweep = SweepPlan {
@@ -157,7 +141,7 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
         rated_torque_nm: args.rated_torque,
         rate_hz: RATE_HZ,
     };
-    let plan = Plan {
+    let plan = RunPlan {
         directions: vec![Direction::Ccw],
         loads_nm: vec![0.0],
         speed_rpm: args.rpm,
@@ -166,25 +150,24 @@ fn prepare(args: &Args) -> Result<(Setup, SweepPlan), Box<dyn std::error::Error>
         accept_no_watchdog: false,
     };
     let note = "calibration of the brake".into();
-    let setup = Setup {
+    let config = RunConfig {
         path: session::log_path(&args.logs, &plan),
         profile,
         model,
         head: LogHead { operator: args.operator.clone(), note, pair_toml, plan_toml: None },
+        conditions: RunMetadata {
+            direction: Direction::Ccw.to_string(),
+            speed_rpm: vec![args.rpm],
+            ..RunMetadata::default()
+        },
+        quiet: true,
     };
-    Ok((setup, sweep))
+    Ok((config, sweep))
 }
 
-fn execute(args: &Args, setup: Setup, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<Outcome, String> {
-    let Setup { path, profile, model, head } = setup;
-    let conditions = RunMetadata {
-        direction: Direction::Ccw.to_string(),
-        speed_rpm: vec![plan.speed_rpm],
-        ..RunMetadata::default()
-    };
-    let work = OnRig { path, profile, model, head, conditions, seed: args.seed, rate_hz: RATE_HZ, quiet: true };
-    let sweep = async |rig: &mut Rig| brake_sweep::execute(rig, plan, swept).await;
-    on_rig(work, async |rig| session::once(rig, sweep).await)
+fn execute(args: &Args, config: RunConfig, plan: &SweepPlan, swept: &Rc<RefCell<Swept>>) -> Result<Outcome, String> {
+    let sweep = async |rig: &mut ConnectedRig| brake_sweep::execute(rig, plan, swept).await;
+    on_rig(config, args.seed, RATE_HZ, async |rig| session::once(rig, sweep).await)
 }
 
 fn conclude(args: &Args, rig: &Profile, plan: &SweepPlan, mean_ratio: f64, swept: &Swept) -> Exit {

@@ -3,7 +3,7 @@
 mod backlash;
 mod check;
 mod curve;
-mod error;
+pub mod error;
 mod method;
 mod outline;
 pub(super) mod output;

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use gearmodel::{Gear, Outline};
 use serde_json::json;
 
+use super::error::OutputError;
 use super::error::{ModelError, check_count};
-use super::output::{Extra, Output, OutputError, Report};
+use super::output::{Extra, Output, Report};
 use super::source::Source;
 use super::table::{Column, Table};
 use crate::chart::{Axis, Chart, Ink, Mark, Panel, Scale, Series};

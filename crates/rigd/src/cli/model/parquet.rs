@@ -11,7 +11,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
-use super::output::OutputError;
+use super::error::OutputError;
 use super::table::{Column, Table, Values};
 
 /// Writes the table.

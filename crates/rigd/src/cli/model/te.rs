@@ -10,7 +10,7 @@ use super::output::Report;
 use super::question::{Asked, Question};
 use super::table::{Column, Table};
 use crate::chart::{Chart, Ink, Mark, Panel, Series};
-use crate::cli::directions::Directions;
+use crate::run::senses::Senses;
 
 /// Predicted transmission error over θ1.
 #[derive(Debug, clap::Args)]
@@ -19,7 +19,7 @@ pub struct Args {
     question: Question,
     /// Senses of the driver
     #[arg(long, value_enum, default_value = "both")]
-    direction: Directions,
+    direction: Senses,
     /// Subtract the value at θ1 = 0; `published` keeps its printed start terms either way
     #[arg(long)]
     relative_to_start: bool,

@@ -130,7 +130,7 @@ fn draws(args: &Args, figures: &[ToleranceFigure]) -> Result<Vec<Extra>, ModelEr
     let Some(path) = &args.draws else { return Ok(Vec::new()) };
     let columns = figures.iter().map(|figure| Column::numbers(figure.name, figure.values_rad.clone())).collect();
     let mut content = Vec::new();
-    Table { columns }.write_csv(&mut content).map_err(|source| super::output::OutputError::Csv {
+    Table { columns }.write_csv(&mut content).map_err(|source| super::error::OutputError::Csv {
         option: "--draws",
         path: path.clone(),
         source,

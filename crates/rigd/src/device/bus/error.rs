@@ -1,6 +1,7 @@
 //! Why a transaction failed, in words that say what to check.
 
 use thiserror::Error;
+use wire::DeviceKind;
 use wire::modbus::{self, ExceptionCode};
 use wire::register_map::RegisterError;
 
@@ -13,7 +14,7 @@ pub enum BusError {
     )]
     Silent {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// Its unit.
@@ -35,7 +36,7 @@ pub enum BusError {
     )]
     Damaged {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// Its unit.
@@ -55,7 +56,7 @@ pub enum BusError {
     #[error("{device} on {port} (unit {unit}) refused {request}: {code}")]
     Refused {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// Its unit.
@@ -69,7 +70,7 @@ pub enum BusError {
     #[error("{device}: {request} is not a request: {reason}")]
     Unaskable {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// What was to be asked.
         request: String,
         /// Why it cannot.
@@ -79,7 +80,7 @@ pub enum BusError {
     #[error("{device} on {port}: {reason}")]
     Value {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// The register, the value and the limit.
@@ -89,7 +90,7 @@ pub enum BusError {
     #[error("{device}: port {port} hung up ({reason}); check the plug, then start again")]
     HungUp {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// The reason.
@@ -101,7 +102,7 @@ pub enum BusError {
     )]
     ReadBack {
         /// Which device.
-        device: &'static str,
+        device: DeviceKind,
         /// Its port.
         port: String,
         /// First register.

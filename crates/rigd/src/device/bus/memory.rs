@@ -45,14 +45,14 @@ impl Shape {
 
 /// How long answers may come after they were due.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Horizon {
+pub struct LateReplyWindow {
     /// An answer that was given up may come until so long after its request, even after later answers.
     pub late: Duration,
     /// An answer that was taken may come once more until so long after.
     pub repeated: Duration,
 }
 
-impl Default for Horizon {
+impl Default for LateReplyWindow {
     fn default() -> Self {
         Self { late: Duration::from_millis(400), repeated: Duration::from_millis(250) }
     }
@@ -66,7 +66,7 @@ struct Trace {
     answered: Option<Instant>,
     /// Its answer was an exception.
     refused: bool,
-    /// A later request was answered: lines keep the order, so within the horizon this one is answered or never.
+    /// A later request was answered: lines keep the order, so within the window this one is answered or never.
     overtaken: bool,
 }
 
@@ -74,13 +74,13 @@ struct Trace {
 #[derive(Debug)]
 pub struct Memory {
     traces: VecDeque<Trace>,
-    horizon: Horizon,
+    late_replies: LateReplyWindow,
 }
 
 impl Memory {
     /// Of a line on which nothing was asked yet.
-    pub fn new(horizon: Horizon) -> Self {
-        Self { traces: VecDeque::new(), horizon }
+    pub fn new(late_replies: LateReplyWindow) -> Self {
+        Self { traces: VecDeque::new(), late_replies }
     }
 
     /// A request is about to be sent.
@@ -102,10 +102,10 @@ impl Memory {
     /// When a request of this shape may be sent; `None`: at once. After that time, if the line was silent, [`Memory::forget`] it.
     pub fn free_at(&mut self, unit: u8, shape: Shape, now: Instant) -> Option<Instant> {
         self.expire(now);
-        // A trace that nothing has overtaken waits for a silence as long as the horizon after all that was sent.
+        // A trace that nothing has overtaken waits for a silence as long as the window after all that was sent.
         let latest = self.traces.back()?.sent;
         let matching = self.traces.iter().filter(|trace| trace.unit == unit && trace.shape == shape);
-        matching.map(|trace| self.end(trace).unwrap_or(latest + self.horizon.late)).max()
+        matching.map(|trace| self.end(trace).unwrap_or(latest + self.late_replies.late)).max()
     }
 
     /// Forgets a shape whose time is over.
@@ -132,26 +132,26 @@ impl Memory {
 
     fn end(&self, trace: &Trace) -> Option<Instant> {
         match trace.answered {
-            Some(answered) => Some(answered + self.horizon.repeated),
-            None if trace.overtaken => Some(trace.sent + self.horizon.late),
+            Some(answered) => Some(answered + self.late_replies.repeated),
+            None if trace.overtaken => Some(trace.sent + self.late_replies.late),
             None => None,
         }
     }
 
     fn expire(&mut self, now: Instant) {
-        let horizon = self.horizon;
+        let late_replies = self.late_replies;
         self.traces.retain(|trace| match trace.answered {
-            Some(answered) => now < answered + horizon.repeated,
-            None => !trace.overtaken || now < trace.sent + horizon.late,
+            Some(answered) => now < answered + late_replies.repeated,
+            None => !trace.overtaken || now < trace.sent + late_replies.late,
         });
-        // A line that never answers is asked on: its oldest debts are beyond any horizon of use.
+        // A line that never answers is asked on: its oldest debts are beyond any window of use.
         while self.traces.len() > LONGEST {
             self.traces.pop_front();
         }
     }
 }
 
-/// Traces kept at most; a device that is asked as fast as it can leaves fewer within any horizon.
+/// Traces kept at most; a device that is asked as fast as it can leaves fewer within any window.
 const LONGEST: usize = 256;
 
 #[cfg(test)]
@@ -162,7 +162,7 @@ mod tests {
     const REPEATED: Duration = Duration::from_millis(250);
 
     fn memory() -> (Memory, Instant) {
-        (Memory::new(Horizon::default()), Instant::now())
+        (Memory::new(LateReplyWindow::default()), Instant::now())
     }
 
     fn ms(n: u64) -> Duration {

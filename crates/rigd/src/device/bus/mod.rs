@@ -9,52 +9,28 @@
 //! 5. consecutive reads are of different lengths: none is sent whose answer could be that of an earlier request (`memory`);
 //! 6. writes are read back, and written again once when they read otherwise.
 //!
-//! What is left: an answer later than [`Horizon`] that also overtakes the order of the line, and damage that a CRC of 16 bits
+//! What is left: an answer later than [`LateReplyWindow`] that also overtakes the order of the line, and damage that a CRC of 16 bits
 //! does not show (never up to three flipped bits or a burst of 16; else once in 65 536 damaged frames).
 
 mod error;
 mod memory;
 mod owner;
 mod statistics;
+mod timing;
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
 use tokio::sync::{mpsc, oneshot};
+use wire::DeviceKind;
 use wire::register_map::{RegisterDef, RegisterError};
 
 pub use error::BusError;
-pub use memory::Horizon;
+pub use memory::LateReplyWindow;
 use owner::{Ask, Job, Owner, Range};
 pub use statistics::BusStatistics;
+pub use timing::{BusTiming, Span};
 
 use crate::link::{Address, Link};
-
-/// How a device wants its line used.
-#[derive(Debug, Clone, Copy)]
-pub struct Manners {
-    /// Silence before a request and after an answer.
-    pub silence: Duration,
-    /// Longest wait for an answer, beyond its time on the wire.
-    pub patience: Duration,
-    /// How often a request is sent before the device counts as lost.
-    pub attempts: u32,
-}
-
-/// Consecutive registers that may all be read, whatever is in them: room for reads of different lengths.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Span {
-    /// First register.
-    pub first: u16,
-    /// How many.
-    pub words: u16,
-}
-
-impl Span {
-    fn end(self) -> u32 {
-        u32::from(self.first) + u32::from(self.words)
-    }
-}
 
 /// Transactions that may wait for the line; a driver asks one after another.
 const QUEUE: usize = 4;
@@ -63,7 +39,7 @@ const WRITES: u32 = 2;
 
 /// Master of one line with one device.
 pub struct Bus {
-    device: &'static str,
+    device: DeviceKind,
     port: String,
     /// Until the first transaction starts its task.
     owner: Option<Owner>,
@@ -75,11 +51,11 @@ pub struct Bus {
 impl Bus {
     /// A master on `link`. Its task starts with the first transaction, in the runtime that asks for it.
     #[must_use]
-    pub fn new(link: Link, address: Address, unit: u8, manners: Manners) -> Self {
+    pub fn new(link: Link, address: Address, unit: u8, timing: BusTiming) -> Self {
         let statistics = Arc::new(Mutex::new(BusStatistics::default()));
         let (jobs, queue) = mpsc::channel(QUEUE);
         let (device, port) = (address.device, address.port.clone());
-        let owner = Some(Owner::new(link, address, unit, manners, queue, Arc::clone(&statistics)));
+        let owner = Some(Owner::new(link, address, unit, timing, queue, Arc::clone(&statistics)));
         Self { device, port, owner, jobs, task: None, statistics }
     }
 
@@ -92,11 +68,11 @@ impl Bus {
         self
     }
 
-    /// The same with another horizon. Before the first transaction.
+    /// The same with another window. Before the first transaction.
     #[must_use]
-    pub fn with_horizon(mut self, horizon: Horizon) -> Self {
+    pub fn with_late_replies(mut self, late_replies: LateReplyWindow) -> Self {
         if let Some(owner) = &mut self.owner {
-            owner.set_horizon(horizon);
+            owner.set_late_replies(late_replies);
         }
         self
     }

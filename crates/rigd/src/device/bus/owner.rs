@@ -11,8 +11,11 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, timeout_at};
 use wire::modbus::{self, ClientDecoder, Request, Response};
 
+use super::error::BusError;
+use super::memory::LateReplyWindow;
 use super::memory::{Memory, Shape};
-use super::{BusError, BusStatistics, Horizon, Manners, Span};
+use super::statistics::BusStatistics;
+use super::timing::{BusTiming, Span};
 use crate::link::{Address, Link};
 
 /// Longest wait for a line to fall silent: shorter than any lease, so that one chattering device never costs the other's.
@@ -53,12 +56,12 @@ pub(super) struct Owner {
     pub link: Option<Link>,
     pub address: Address,
     pub unit: u8,
-    pub manners: Manners,
+    pub timing: BusTiming,
     pub spans: Vec<Span>,
     pub jobs: mpsc::Receiver<Job>,
     pub statistics: Arc<Mutex<BusStatistics>>,
     memory: Memory,
-    horizon: Horizon,
+    late_replies: LateReplyWindow,
     quiet_since: Instant,
     suspect: bool,
     /// Nobody knows what was asked here before: an earlier run may have died waiting.
@@ -78,7 +81,7 @@ impl Owner {
         link: Link,
         address: Address,
         unit: u8,
-        manners: Manners,
+        timing: BusTiming,
         jobs: mpsc::Receiver<Job>,
         statistics: Arc<Mutex<BusStatistics>>,
     ) -> Self {
@@ -87,12 +90,12 @@ impl Owner {
             link: Some(link),
             address,
             unit,
-            manners: Manners { silence: manners.silence.max(silence), ..manners },
+            timing: BusTiming { silence: timing.silence.max(silence), ..timing },
             spans: Vec::new(),
             jobs,
             statistics,
-            memory: Memory::new(Horizon::default()),
-            horizon: Horizon::default(),
+            memory: Memory::new(LateReplyWindow::default()),
+            late_replies: LateReplyWindow::default(),
             quiet_since: Instant::now(),
             // What an earlier master left on the line is no answer to us.
             suspect: true,
@@ -101,9 +104,9 @@ impl Owner {
         }
     }
 
-    pub fn set_horizon(&mut self, horizon: Horizon) {
-        self.memory = Memory::new(horizon);
-        self.horizon = horizon;
+    pub fn set_late_replies(&mut self, late_replies: LateReplyWindow) {
+        self.memory = Memory::new(late_replies);
+        self.late_replies = late_replies;
     }
 
     /// Serves until nobody can ask any more.
@@ -215,7 +218,7 @@ impl Owner {
     ) -> Result<Response, BusError> {
         let mut request = make(self, Instant::now());
         let mut last = Failure::TimedOut;
-        for attempt in 0..self.manners.attempts {
+        for attempt in 0..self.timing.attempts {
             if attempt > 0 {
                 self.count(|statistics| statistics.retried += 1);
                 request = make(self, Instant::now());
@@ -258,7 +261,7 @@ impl Owner {
                 self.memory.forget(self.unit, shape);
             }
         }
-        self.listen_until(self.quiet_since + self.manners.silence).await?;
+        self.listen_until(self.quiet_since + self.timing.silence).await?;
         if self.suspect { self.drain().await } else { Ok(()) }
     }
 
@@ -274,7 +277,7 @@ impl Owner {
         // 11 bits a character at most; both frames pass the wire before patience begins.
         let characters = frame.len() + request.response_len();
         let on_wire = Duration::from_secs_f64(characters as f64 * 11.0 / f64::from(self.address.baud));
-        let deadline = sent + on_wire + self.manners.patience;
+        let deadline = sent + on_wire + self.timing.patience;
         let mut decoder = ClientDecoder::new(self.unit, request);
         let mut buffer = [0; 512];
         loop {
@@ -309,7 +312,8 @@ impl Owner {
 
     /// Reads and discards until the line has been silent, so that a late answer is gone before the next request.
     async fn drain(&mut self) -> Result<(), BusError> {
-        let quiet = if std::mem::take(&mut self.fresh) { self.horizon.late } else { self.manners.silence.max(QUIET) };
+        let quiet =
+            if std::mem::take(&mut self.fresh) { self.late_replies.late } else { self.timing.silence.max(QUIET) };
         // A line that never falls silent is not Modbus; the request that follows will tell.
         let give_up = Instant::now() + quiet + DRAIN_LIMIT;
         loop {
@@ -378,7 +382,7 @@ impl Owner {
 
     fn failed(&self, request: &Request, last: Failure) -> BusError {
         let (device, port, unit, attempts) =
-            (self.address.device, self.address.port.clone(), self.unit, self.manners.attempts);
+            (self.address.device, self.address.port.clone(), self.unit, self.timing.attempts);
         let (baud, format, request) = (self.address.baud, self.address.format.clone(), request.to_string());
         match last {
             Failure::Refused(code) => BusError::Refused { device, port, unit, request, code },
@@ -388,7 +392,7 @@ impl Owner {
                 unit,
                 attempts,
                 request,
-                patience_ms: self.manners.patience.as_millis(),
+                patience_ms: self.timing.patience.as_millis(),
                 baud,
                 format,
             },

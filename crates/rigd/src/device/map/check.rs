@@ -1,15 +1,10 @@
 //! Everything that can be wrong with a register map beyond its syntax, each with its line.
 
-use super::{AccessRule, Kind, Map, NumberType, Step, StepValue, Test};
+use super::{AccessRule, Kind, Map, NumberType, Step, StepValue, Test, alarm_code};
 use crate::profile::lines::{Fault, Lines};
 
 /// Quantities of a run that steps may name.
 pub const QUANTITIES: [&str; 4] = ["accel_ms", "decel_ms", "lease_s", "voltage_v"];
-
-/// An alarm's code as a key: `0x0020` or `32`.
-pub fn code(key: &str) -> Option<u16> {
-    key.strip_prefix("0x").map_or_else(|| key.parse().ok(), |hex| u16::from_str_radix(hex, 16).ok())
-}
 
 /// Every fault of a map.
 pub fn check(map: &Map, text: &str) -> Vec<Fault> {
@@ -57,7 +52,7 @@ impl Check<'_> {
                 );
             }
         }
-        for key in self.map.alarms.keys().filter(|key| code(key).is_none()) {
+        for key in self.map.alarms.keys().filter(|key| alarm_code(key).is_none()) {
             self.fault(&["alarms", key], "is not a code: write 0x0020 or 32");
         }
     }

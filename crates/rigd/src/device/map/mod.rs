@@ -5,26 +5,19 @@
 //! steps that prepare, enable and release the device. It states its sources.
 
 mod check;
+mod load;
+mod mapped;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use serde::Deserialize;
-use thiserror::Error;
 use wire::register_map::{Access, RegisterDef, RegisterKind};
 
-use super::bus::{Bus, BusError, Horizon, Manners, Span};
-use crate::link::{Address, Link};
-use crate::profile::lines::Fault;
-use crate::profile::{BrakeProfile, ServoProfile};
+pub use load::{BUILT_IN, MapError};
+pub(super) use mapped::Mapped;
 
-/// Maps that come with the program.
-pub const BUILT_IN: &[(&str, &str)] = &[
-    ("asda-b2", include_str!("asda-b2.toml")),
-    ("dsy-rs", include_str!("dsy-rs.toml")),
-    ("rd60xx", include_str!("rd60xx.toml")),
-];
+/// Driver's name of a device whose register map is a file of its own, named by `map`.
+pub const DRIVER: &str = "map";
 
 /// A device as data.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -327,85 +320,7 @@ pub struct BrakeStatusRules {
     pub enabled: Test,
 }
 
-/// Why a map is refused.
-#[derive(Debug, Error)]
-pub enum MapError {
-    /// The file could not be read.
-    #[error("register map {path}: {source}; name a file that you may read, or one of the built-in maps")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's reason.
-        source: std::io::Error,
-    },
-    /// It is not a map.
-    #[error("register map {path} has {} faults: {}", faults.len(), list(faults))]
-    Faults {
-        /// The file.
-        path: PathBuf,
-        /// All of them.
-        faults: Vec<Fault>,
-    },
-}
-
-fn list(faults: &[Fault]) -> String {
-    faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
-}
-
 impl Map {
-    /// A built-in map.
-    #[must_use]
-    pub fn built_in(name: &str) -> Option<Self> {
-        let (_, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
-        Self::parse(text).ok()
-    }
-
-    /// Reads and checks a map.
-    ///
-    /// # Errors
-    /// [`MapError`] with every fault and its line.
-    pub fn load(path: &Path) -> Result<Self, MapError> {
-        let text = std::fs::read_to_string(path).map_err(|source| MapError::Read { path: path.into(), source })?;
-        Self::parse(&text).map_err(|faults| MapError::Faults { path: path.into(), faults })
-    }
-
-    /// Checks a map's text.
-    ///
-    /// # Errors
-    /// Every fault, with its line.
-    pub fn parse(text: &str) -> Result<Self, Vec<Fault>> {
-        let map: Self = toml::from_str(text).map_err(|error| vec![Fault::of(text, &error)])?;
-        let faults = check::check(&map, text);
-        if faults.is_empty() { Ok(map) } else { Err(faults) }
-    }
-
-    /// The map that a driver's name, or a profile's file, stands for.
-    ///
-    /// # Errors
-    /// What is wrong with it, or that there is none.
-    pub fn named(driver: &str, file: Option<&Path>) -> Result<Self, String> {
-        match file {
-            Some(path) if driver == super::MAP => Self::load(path).map_err(|error| error.to_string()),
-            Some(path) => Err(format!("map = {} goes with driver = \"{}\"", path.display(), super::MAP)),
-            None if driver == super::MAP => Err("driver \"map\" needs map = \"FILE.toml\"".into()),
-            None => Self::built_in(driver).ok_or_else(|| format!("no built-in register map '{driver}'")),
-        }
-    }
-
-    /// The map of a servo, with its rules.
-    pub(super) fn of_servo(profile: &ServoProfile) -> Result<(Self, ServoRules), String> {
-        let map = Self::named(&profile.driver, profile.map.as_deref())?;
-        let rules = map.servo.clone().ok_or_else(|| format!("the map '{}' is not of a servo", map.name))?;
-        Ok((map, rules))
-    }
-
-    /// The map of a brake's current source, with its rules.
-    pub(super) fn of_brake(profile: &BrakeProfile) -> Result<(Self, BrakeRules), String> {
-        let map = Self::named(&profile.driver, profile.map.as_deref())?;
-        let rules = map.brake.clone().ok_or_else(|| format!("the map '{}' is not of a brake's source", map.name))?;
-        Ok((map, rules))
-    }
-
     /// A register as the bus takes it, with a model's scale and limit.
     #[must_use]
     pub fn register(&self, name: &str, model: Option<&ModelRules>) -> Option<RegisterDef> {
@@ -429,26 +344,17 @@ impl Map {
         })
     }
 
-    /// A master of the device's line.
-    #[must_use]
-    pub fn bus(&self, link: Link, address: Address, unit: u8, horizon: Horizon) -> Bus {
-        let ms = |value: f64| Duration::from_secs_f64(value * 1e-3);
-        let manners = Manners {
-            silence: ms(self.line.silence_ms),
-            patience: ms(self.line.patience_ms),
-            attempts: self.line.attempts,
-        };
-        let spans: Vec<Span> =
-            self.line.readable.iter().map(|[first, words]| Span { first: *first, words: *words }).collect();
-        Bus::new(link, address, unit, manners).with_spans(&spans).with_horizon(horizon)
-    }
-
     /// An alarm's code and meaning.
     #[must_use]
     pub fn alarm_text(&self, code: u16) -> String {
-        let meaning = self.alarms.iter().find(|(key, _)| check::code(key) == Some(code)).map(|(_, text)| text.as_str());
+        let meaning = self.alarms.iter().find(|(key, _)| alarm_code(key) == Some(code)).map(|(_, text)| text.as_str());
         format!("alarm {code:04X}h: {}", meaning.unwrap_or("see the alarm list of the manual"))
     }
+}
+
+/// An alarm's code as a key: `0x0020` or `32`.
+fn alarm_code(key: &str) -> Option<u16> {
+    key.strip_prefix("0x").map_or_else(|| key.parse().ok(), |hex| u16::from_str_radix(hex, 16).ok())
 }
 
 impl Register {
@@ -465,55 +371,6 @@ impl Register {
             NumberType::I32 => RegisterKind::I32HighFirst,
             NumberType::SignMagnitude => RegisterKind::SignMagnitude,
         }
-    }
-}
-
-/// A device on its line, driven by its map.
-pub(super) struct Mapped {
-    pub bus: Bus,
-    pub map: Map,
-    pub model: Option<ModelRules>,
-}
-
-/// Quantities of a run that steps may name.
-pub(super) type Quantities<'a> = &'a [(&'static str, f64)];
-
-impl Mapped {
-    /// A register of the map; the map's check has found every name that its rules use.
-    pub fn register(&self, name: &str) -> RegisterDef {
-        self.map
-            .register(name, self.model.as_ref())
-            .unwrap_or_else(|| RegisterDef::new("(not in the map)", 0, RegisterKind::U16, 1.0, "", Access::Read))
-    }
-
-    /// A register for a person: its name, with that of the manual where the map tells it.
-    pub fn called(&self, name: &str) -> String {
-        match self.map.registers.get(name) {
-            Some(register) if !register.label.is_empty() => format!("{name} {}", register.label),
-            _ => name.to_owned(),
-        }
-    }
-
-    pub async fn get(&mut self, name: &str) -> Result<f64, BusError> {
-        let register = self.register(name);
-        self.bus.get(&register).await
-    }
-
-    /// Writes a register, and reads it back where it can be.
-    pub async fn set(&mut self, name: &str, value: f64) -> Result<(), BusError> {
-        let register = self.register(name);
-        if self.map.registers.get(name).is_some_and(|register| register.read_back) {
-            return self.bus.set(&register, value).await;
-        }
-        let words = register.encode(value).map_err(|reason| self.bus.value_error(reason))?;
-        self.bus.write_unverified(register.address, &words).await
-    }
-
-    pub async fn run(&mut self, steps: &[Step], quantities: Quantities<'_>) -> Result<(), BusError> {
-        for step in steps {
-            self.set(&step.set, step.value(quantities)).await?;
-        }
-        Ok(())
     }
 }
 

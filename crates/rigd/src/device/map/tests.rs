@@ -6,7 +6,7 @@ use super::*;
 
 fn map(name: &str) -> Map {
     let (_, text) = BUILT_IN.iter().find(|(known, _)| *known == name).expect("built in");
-    Map::parse(text).unwrap_or_else(|faults| panic!("{name}: {}", list(&faults)))
+    Map::parse(text).unwrap_or_else(|faults| panic!("{name}: {faults:?}"))
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn every_fault_is_told_at_once_with_its_line() {
         .replace("to = \"lease_s\"", "to = \"lease\"")
         .replace("{ set = \"fault_action\", to = 1 }", "{ set = \"fault_action\", to = 7 }");
     let faults = Map::parse(&wrong).expect_err("five faults");
-    let said = list(&faults);
+    let said = faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
     for part in ["line.silence_ms = -1", "'speed_9'", "has two words", "'lease'", "7"] {
         assert!(said.contains(part), "{part}: {said}");
     }

@@ -2,32 +2,25 @@
 
 use thiserror::Error;
 
+use super::admission::Refusal;
+use super::limits::Exceeded;
 use super::supervisor::{Event, State};
-use crate::device::{BusError, DeviceError, DeviceKind, UnknownDriver};
+use crate::device::drivers::UnknownDriver;
+use crate::device::{BusError, DeviceError, DeviceKind};
 use crate::link::LinkError;
 
 /// Why a run ends before its time.
 #[derive(Debug, Error)]
-pub enum Halt {
+pub enum StopReason {
     /// Ctrl-C, SIGTERM or `rigd stop`.
     #[error("stopped by the operator")]
     Operator,
     /// A limit of the profile.
-    #[error("{quantity} {value:.4} {unit} is over the limit {limit} {unit} of the profile ({key}); {advice}")]
-    Limit {
-        /// What went over.
-        quantity: &'static str,
-        /// How far.
-        value: f64,
-        /// The limit.
-        limit: f64,
-        /// Unit of both.
-        unit: &'static str,
-        /// The profile's key.
-        key: &'static str,
-        /// What to do next.
-        advice: &'static str,
-    },
+    #[error(transparent)]
+    Limit(#[from] Exceeded),
+    /// The run was never within the profile's limits.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
     /// A device failed or is lost.
     #[error(transparent)]
     Device(#[from] DeviceError),
@@ -73,10 +66,10 @@ pub enum Halt {
         state: State,
     },
     /// A lost device did not come back.
-    #[error("{part} did not come back within {patience_s} s: {last}")]
+    #[error("{device} did not come back within {patience_s} s: {last}")]
     NotBack {
         /// Which.
-        part: DeviceKind,
+        device: DeviceKind,
         /// How long was waited.
         patience_s: f64,
         /// What it said last.
@@ -153,17 +146,17 @@ pub enum Halt {
     Journal(#[from] crate::campaign::CampaignError),
 }
 
-impl Halt {
+impl StopReason {
     /// What it means to the supervisor.
     #[must_use]
     pub fn event(&self) -> Event {
         match self {
             Self::Operator => Event::OperatorStop,
             Self::Paused => Event::Finished,
-            Self::Limit { .. } => Event::Limit,
+            Self::Limit(_) => Event::Limit,
             Self::EmergencyStop { .. } => Event::EmergencyStop,
             Self::LeaseExpired { .. } => Event::LeaseExpired,
-            _ => match self.lost_part() {
+            _ => match self.lost_device() {
                 Some(DeviceKind::Servo) => Event::ServoLost,
                 Some(DeviceKind::Brake) => Event::BrakeLost,
                 Some(DeviceKind::Counter) => Event::EncodersLost,
@@ -174,11 +167,11 @@ impl Halt {
 
     /// The device that does not answer any more, where that is the reason: it may come back.
     #[must_use]
-    pub fn lost_part(&self) -> Option<DeviceKind> {
+    pub fn lost_device(&self) -> Option<DeviceKind> {
         match self {
-            Self::Device(error) => lost_part(error),
+            Self::Device(error) => lost_device(error),
             Self::EncodersSilent { .. } => Some(DeviceKind::Counter),
-            Self::NotBack { part, .. } => Some(*part),
+            Self::NotBack { device, .. } => Some(*device),
             _ => None,
         }
     }
@@ -186,11 +179,11 @@ impl Halt {
 
 /// The device that an error says is gone; `None` for one that answers, but not as it should.
 #[must_use]
-pub fn lost_part(error: &DeviceError) -> Option<DeviceKind> {
+pub fn lost_device(error: &DeviceError) -> Option<DeviceKind> {
     match error {
         DeviceError::Bus(
             BusError::Silent { device, .. } | BusError::Damaged { device, .. } | BusError::HungUp { device, .. },
-        ) => DeviceKind::ALL.into_iter().find(|part| part.name() == *device),
+        ) => Some(*device),
         DeviceError::Counter { .. } => Some(DeviceKind::Counter),
         _ => None,
     }

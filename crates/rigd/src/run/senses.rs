@@ -1,10 +1,12 @@
-//! Senses of rotation on the command line.
+//! One sense of rotation or both, as the command line and plans write them.
 
 use gearmodel::Direction;
+use serde::{Deserialize, Serialize};
 
 /// Senses in the order in which they are run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Directions {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Senses {
     /// Counter-clockwise alone.
     Ccw,
     /// Clockwise alone.
@@ -13,7 +15,7 @@ pub enum Directions {
     Both,
 }
 
-impl Directions {
+impl Senses {
     /// As a list.
     #[must_use]
     pub fn list(self) -> Vec<Direction> {

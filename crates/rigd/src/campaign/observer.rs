@@ -13,12 +13,12 @@ use super::journal::{FinishedRun, Journal, Line};
 use super::schedule::Schedule;
 use crate::clock::Clock;
 use crate::profile::Profile;
-use crate::run::attend::Attendant;
-use crate::run::halt::Halt;
+use crate::run::connected_rig::ConnectedRig;
 use crate::run::job::{Kind, RunSpec};
+use crate::run::observer::RunObserver;
 use crate::run::recorder::Recorder;
-use crate::run::rig::Rig;
 use crate::run::session::{LogHead, writer_options};
+use crate::run::stop_reason::StopReason;
 use crate::run::supervisor::State;
 
 /// Logs of runs that were not finished; out of the way of `rigd diagnose DIR/*.mcap`.
@@ -32,8 +32,8 @@ struct Current {
     finished: Option<Box<FinishedRun>>,
 }
 
-/// The attendant of a campaign.
-pub struct Conductor {
+/// Looks on at a campaign: a log for each run, and the journal.
+pub struct CampaignObserver {
     directory: PathBuf,
     profile: Profile,
     head: LogHead,
@@ -52,7 +52,7 @@ pub struct Conductor {
     pub interruptions: Vec<String>,
 }
 
-impl Conductor {
+impl CampaignObserver {
     /// For the runs `indices` of a schedule, into a directory with its journal.
     #[must_use]
     pub fn new(
@@ -82,8 +82,8 @@ impl Conductor {
     /// The log of the first run, before anything is connected.
     ///
     /// # Errors
-    /// [`Halt::Log`], [`Halt::Journal`].
-    pub fn begin(&mut self) -> Result<Recorder, Halt> {
+    /// [`StopReason::Log`], [`StopReason::Journal`].
+    pub fn begin(&mut self) -> Result<Recorder, StopReason> {
         let first = self.indices.first().copied().unwrap_or(0);
         let began = Line::Began {
             plan: self.schedule.fingerprint.clone(),
@@ -103,12 +103,12 @@ impl Conductor {
     ///
     /// # Errors
     /// [`CampaignError::Io`].
-    pub fn conclude(&mut self, finalised: bool, halt: Option<&Halt>) -> Result<(), CampaignError> {
+    pub fn conclude(&mut self, finalised: bool, reason: Option<&StopReason>) -> Result<(), CampaignError> {
         if let (Some(current), Some(journal)) = (self.current.take(), &mut self.journal) {
             close(journal, &self.directory, current, finalised)?;
         }
-        if let Some(halt) = halt {
-            self.write(&Line::Interrupted { at: now(), why: halt.to_string(), goes_on: false })?;
+        if let Some(reason) = reason {
+            self.write(&Line::Interrupted { at: now(), why: reason.to_string(), goes_on: false })?;
         }
         Ok(())
     }
@@ -156,7 +156,7 @@ impl Conductor {
 
     /// Goes on in a new log for `run`; the one before is finalised and entered in the journal, on other threads, so that neither
     /// encoders nor servo wait for a disk.
-    async fn rotate(&mut self, rig: &mut Rig, run: usize) -> Result<(), Halt> {
+    async fn rotate(&mut self, rig: &mut ConnectedRig, run: usize) -> Result<(), StopReason> {
         let path = self.free_path(run);
         let (at, options, policy) = (path.clone(), writer_options(&self.profile), self.profile.log.clone());
         let (made, trouble) = in_the_background(rig, move || Recorder::create(&at, options, &policy)).await;
@@ -177,7 +177,7 @@ impl Conductor {
         .await;
         let (journal, finished, entered) = closed;
         self.journal = journal;
-        finished.map_err(Halt::Log)?;
+        finished.map_err(StopReason::Log)?;
         entered?;
         trouble.or(other_trouble).map_or(Ok(()), Err)
     }
@@ -189,7 +189,7 @@ impl Conductor {
         format!("run {run}/{}, {} left", self.schedule.runs.len(), time(left))
     }
 
-    fn figures(&self, rig: &Rig, index: usize, run: &RunSpec) -> FinishedRun {
+    fn figures(&self, rig: &ConnectedRig, index: usize, run: &RunSpec) -> FinishedRun {
         let acquisition = rig.acquisition.borrow();
         let log = self.current.as_ref().and_then(|current| current.path.file_name());
         let mut finished = FinishedRun {
@@ -222,8 +222,8 @@ impl Conductor {
 }
 
 #[async_trait(?Send)]
-impl Attendant for Conductor {
-    async fn begins(&mut self, rig: &mut Rig, job_index: usize, _: &RunSpec) -> Result<(), Halt> {
+impl RunObserver for CampaignObserver {
+    async fn begins(&mut self, rig: &mut ConnectedRig, job_index: usize, _: &RunSpec) -> Result<(), StopReason> {
         let Some(&run) = self.indices.get(job_index) else { return Ok(()) };
         let is_fresh = self.current.as_ref().is_some_and(|current| current.run == run && current.finished.is_none());
         if !is_fresh {
@@ -235,7 +235,7 @@ impl Attendant for Conductor {
         Ok(())
     }
 
-    async fn ended(&mut self, rig: &mut Rig, job_index: usize, spec: &RunSpec) -> Result<(), Halt> {
+    async fn ended(&mut self, rig: &mut ConnectedRig, job_index: usize, spec: &RunSpec) -> Result<(), StopReason> {
         let Some(&run) = self.indices.get(job_index) else { return Ok(()) };
         let finished = self.figures(rig, run, spec);
         if !self.quiet {
@@ -248,14 +248,19 @@ impl Attendant for Conductor {
         Ok(())
     }
 
-    async fn interrupted(&mut self, rig: &mut Rig, halt: &Halt, goes_on: bool) -> Result<(), Halt> {
-        self.interruptions.push(halt.to_string());
+    async fn interrupted(
+        &mut self,
+        rig: &mut ConnectedRig,
+        reason: &StopReason,
+        goes_on: bool,
+    ) -> Result<(), StopReason> {
+        self.interruptions.push(reason.to_string());
         if !goes_on {
             // Told when the last log is finalised.
             return Ok(());
         }
-        self.write(&Line::Interrupted { at: now(), why: halt.to_string(), goes_on })?;
-        if matches!(halt, Halt::Paused) {
+        self.write(&Line::Interrupted { at: now(), why: reason.to_string(), goes_on })?;
+        if matches!(reason, StopReason::Paused) {
             return Ok(());
         }
         // What was recorded up to here is kept, but beside: the run is done again in a log of its own.
@@ -310,9 +315,9 @@ fn close(journal: &mut Journal, directory: &Path, closing: Current, finalised: b
 
 /// Work with files on a thread of its own; a rig that is on is polled meanwhile, for its lease runs. Also why it has to stop.
 async fn in_the_background<T: Send + 'static>(
-    rig: &mut Rig,
+    rig: &mut ConnectedRig,
     work: impl FnOnce() -> T + Send + 'static,
-) -> (T, Option<Halt>) {
+) -> (T, Option<StopReason>) {
     let work = tokio::task::spawn_blocking(work);
     let mut trouble = None;
     while matches!(rig.state(), State::Standing | State::Turning) && !work.is_finished() && trouble.is_none() {

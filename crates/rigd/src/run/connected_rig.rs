@@ -10,17 +10,15 @@ use tokio::task::JoinHandle;
 use tokio::time::{Instant, MissedTickBehavior};
 
 use super::acquire::Acquisition;
-use super::halt::{Halt, lost_part};
+use super::dialer::Dialer;
 use super::limits::{self, HeatAccount, Observed};
 use super::progress::Progress;
-use super::reconnect::Dialer;
 use super::stop::StopRequests;
+use super::stop_reason::{StopReason, lost_device};
 use super::supervisor::{Event, State};
 use crate::clock::Clock;
 use crate::device::{Brake, BrakeStatus, Counter, DeviceError, DeviceKind, Servo, ServoStatus};
 use crate::profile::Profile;
-
-pub use super::limits::slip_power_w;
 
 /// The three drivers.
 pub struct Devices {
@@ -33,7 +31,7 @@ pub struct Devices {
 }
 
 /// The connected rig.
-pub struct Rig {
+pub struct ConnectedRig {
     /// The profile in force.
     pub profile: Profile,
     /// The servo drive.
@@ -72,7 +70,7 @@ pub(super) struct Stream {
     pub(super) end: Rc<tokio::sync::Notify>,
 }
 
-impl Rig {
+impl ConnectedRig {
     /// A rig of connected devices.
     #[must_use]
     pub fn new(
@@ -113,8 +111,8 @@ impl Rig {
         self.state
     }
 
-    /// Tells the supervisor an event of starting or running; stops go through [`Rig::switch_off`], which performs their actions.
-    pub(super) fn tell(&mut self, event: Event) {
+    /// Tells the supervisor an event of starting or running; stops go through [`ConnectedRig::switch_off`], which performs their actions.
+    pub(super) fn apply_event(&mut self, event: Event) {
         debug_assert!(!event.is_stop(), "{event:?} has actions");
         self.state = self.state.on(event).0;
     }
@@ -167,10 +165,10 @@ impl Rig {
     /// One poll: renews the lease, reads both drives, writes the state, and checks every limit.
     ///
     /// # Errors
-    /// [`Halt`] when the run has to end.
-    pub async fn tick(&mut self) -> Result<(), Halt> {
+    /// [`StopReason`] when the run has to end.
+    pub async fn tick(&mut self) -> Result<(), StopReason> {
         self.poll.tick().await;
-        self.heed_stop()?;
+        self.check_stop()?;
         self.check_lease()?;
         self.observe().await?;
         self.supervise()
@@ -179,34 +177,34 @@ impl Rig {
     /// Before anything that moves.
     ///
     /// # Errors
-    /// [`Halt::Operator`] when a stop was asked for.
-    pub fn heed_stop(&self) -> Result<(), Halt> {
-        if self.stop.any() { Err(Halt::Operator) } else { Ok(()) }
+    /// [`StopReason::Operator`] when a stop was asked for.
+    pub fn check_stop(&self) -> Result<(), StopReason> {
+        if self.stop.any() { Err(StopReason::Operator) } else { Ok(()) }
     }
 
     /// A process that was frozen finds that its lease has run out: what it believed of the rig is old.
-    fn check_lease(&self) -> Result<(), Halt> {
+    fn check_lease(&self) -> Result<(), StopReason> {
         let (silent_s, lease_s) = (self.heard.elapsed().as_secs_f64(), self.profile.sequence.lease_s);
         let held = matches!(self.state, State::Standing | State::Turning);
-        if held && silent_s > lease_s { Err(Halt::LeaseExpired { silent_s, lease_s }) } else { Ok(()) }
+        if held && silent_s > lease_s { Err(StopReason::LeaseExpired { silent_s, lease_s }) } else { Ok(()) }
     }
 
     /// Remembers whether a device answers.
-    pub(super) fn note<T>(&mut self, outcome: Result<T, DeviceError>) -> Result<T, Halt> {
+    pub(super) fn note<T>(&mut self, outcome: Result<T, DeviceError>) -> Result<T, StopReason> {
         if let Err(error) = &outcome
-            && let Some(part) = lost_part(error)
+            && let Some(device) = lost_device(error)
         {
-            self.lose(part);
+            self.lose(device);
         }
         Ok(outcome?)
     }
 
-    pub(super) fn lose(&mut self, part: DeviceKind) {
-        self.lost[part as usize] = true;
+    pub(super) fn lose(&mut self, device: DeviceKind) {
+        self.lost[device as usize] = true;
     }
 
     /// Reads the servo, and renews its lease by that.
-    async fn servo_status(&mut self) -> Result<ServoStatus, Halt> {
+    async fn servo_status(&mut self) -> Result<ServoStatus, StopReason> {
         let status = self.servo.status().await;
         if status.is_ok() {
             self.heard = Instant::now();
@@ -215,7 +213,7 @@ impl Rig {
     }
 
     /// Reads the brake's driver, and renews the servo's lease if that takes long.
-    pub(super) async fn brake_status(&mut self) -> Result<BrakeStatus, Halt> {
+    pub(super) async fn brake_status(&mut self) -> Result<BrakeStatus, StopReason> {
         let lease_s = self.profile.sequence.lease_s;
         let status = keep_lease(self.servo.as_mut(), &mut self.heard, lease_s, self.brake.status()).await;
         let status = self.note(status)?;
@@ -227,7 +225,7 @@ impl Rig {
     }
 
     /// Reads both drives and writes the state.
-    pub(super) async fn observe(&mut self) -> Result<(), Halt> {
+    pub(super) async fn observe(&mut self) -> Result<(), StopReason> {
         let servo = self.servo_status().await?;
         self.acquisition.borrow_mut().status.servo_alarm = servo.alarm;
         let brake = self.brake_status().await?;
@@ -238,13 +236,13 @@ impl Rig {
             self.progress.show(&rig, self.finished_revolutions + rig.latest.revolutions);
         }
         if self.servo.is_emergency_stop(servo.alarm) {
-            return Err(Halt::EmergencyStop { alarm: servo.alarm });
+            return Err(StopReason::EmergencyStop { alarm: servo.alarm });
         }
         if servo.alarm != 0 {
-            return Err(Halt::Alarm { alarm: servo.alarm });
+            return Err(StopReason::Alarm { alarm: servo.alarm });
         }
         if brake.tripped {
-            return Err(Halt::BrakeTripped);
+            return Err(StopReason::BrakeTripped);
         }
         Ok(())
     }
@@ -257,7 +255,7 @@ impl Rig {
         self.heat.book(&self.profile.limits, rig.status.load_nm, rig.latest.speed_rpm, seconds);
     }
 
-    fn supervise(&mut self) -> Result<(), Halt> {
+    fn supervise(&mut self) -> Result<(), StopReason> {
         self.log_works()?;
         self.encoders_live()?;
         let observed = {
@@ -270,21 +268,21 @@ impl Rig {
             }
         };
         limits::check(&self.profile.limits, &observed)?;
-        self.heat.check(&self.profile.limits)
+        Ok(self.heat.check(&self.profile.limits)?)
     }
 
     /// The log is still being written.
-    pub(super) fn log_works(&self) -> Result<(), Halt> {
+    pub(super) fn log_works(&self) -> Result<(), StopReason> {
         let rig = self.acquisition.borrow();
         match rig.recorder().take_failure() {
-            Some(failure) => Err(Halt::Log(failure)),
-            None if rig.recorder().unwritten() > 0 => Err(Halt::Panic { what: "the recorder has ended".into() }),
+            Some(failure) => Err(StopReason::Log(failure)),
+            None if rig.recorder().unwritten() > 0 => Err(StopReason::Panic { what: "the recorder has ended".into() }),
             None => Ok(()),
         }
     }
 
     /// The encoders' stream is alive and fresh.
-    pub(super) fn encoders_live(&mut self) -> Result<(), Halt> {
+    pub(super) fn encoders_live(&mut self) -> Result<(), StopReason> {
         let Some(stream) = &self.stream else { return Ok(()) };
         let failure = stream.failure.borrow_mut().take();
         if let Some(failure) = failure {
@@ -296,7 +294,7 @@ impl Rig {
         if arrived_ns > 0 && silent_ms > limit_ms {
             self.lose(DeviceKind::Counter);
             let port = self.profile.counter.port.clone();
-            return Err(Halt::EncodersSilent { port, silent_ms, limit_ms });
+            return Err(StopReason::EncodersSilent { port, silent_ms, limit_ms });
         }
         Ok(())
     }
@@ -304,13 +302,13 @@ impl Rig {
     /// Polls until `done`; an error when it takes longer than `seconds`.
     ///
     /// # Errors
-    /// [`Halt`], among them [`Halt::TooLong`].
+    /// [`StopReason`], among them [`StopReason::TooLong`].
     pub async fn until(
         &mut self,
         what: &'static str,
         seconds: f64,
         mut done: impl FnMut(&mut Acquisition) -> bool,
-    ) -> Result<(), Halt> {
+    ) -> Result<(), StopReason> {
         let deadline = Instant::now() + Duration::from_secs_f64(seconds);
         loop {
             self.tick().await?;
@@ -320,7 +318,7 @@ impl Rig {
             }
             if Instant::now() > deadline {
                 let now = format!("{:.2} rpm, {:.2} N·m", rig.latest.speed_rpm, rig.status.load_nm);
-                return Err(Halt::TooLong { what, seconds, now });
+                return Err(StopReason::TooLong { what, seconds, now });
             }
         }
     }
@@ -328,8 +326,8 @@ impl Rig {
     /// Polls for a time.
     ///
     /// # Errors
-    /// [`Halt`].
-    pub async fn hold(&mut self, seconds: f64) -> Result<(), Halt> {
+    /// [`StopReason`].
+    pub async fn hold(&mut self, seconds: f64) -> Result<(), StopReason> {
         let end = Instant::now() + Duration::from_secs_f64(seconds);
         while Instant::now() < end {
             self.tick().await?;
@@ -347,12 +345,12 @@ impl Rig {
     /// Speed setpoint of the driver, rpm, + = ccw; any but 0 only where the supervisor allows motion.
     ///
     /// # Errors
-    /// [`Halt::NotPermitted`], [`Halt::Device`].
-    pub async fn set_speed(&mut self, direction: Option<Direction>, speed_rpm: f64) -> Result<(), Halt> {
+    /// [`StopReason::NotPermitted`], [`StopReason::Device`].
+    pub async fn set_speed(&mut self, direction: Option<Direction>, speed_rpm: f64) -> Result<(), StopReason> {
         if speed_rpm != 0.0 {
-            self.tell(Event::Motion);
+            self.apply_event(Event::Motion);
             if self.state != State::Turning {
-                return Err(Halt::NotPermitted { speed_rpm, state: self.state });
+                return Err(StopReason::NotPermitted { speed_rpm, state: self.state });
             }
         }
         {
@@ -373,8 +371,8 @@ impl Rig {
     /// Load setpoint at the driven gear, N·m, by the branch of the brake's curve on which the current then lies.
     ///
     /// # Errors
-    /// [`Halt::Device`].
-    pub async fn set_load(&mut self, load_nm: f64) -> Result<(), Halt> {
+    /// [`StopReason::Device`].
+    pub async fn set_load(&mut self, load_nm: f64) -> Result<(), StopReason> {
         let from_a = {
             let mut rig = self.acquisition.borrow_mut();
             rig.status.load_setpoint_nm = load_nm;
@@ -387,8 +385,8 @@ impl Rig {
     /// Current of the brake's coil, A: for its calibration, which has no curve yet.
     ///
     /// # Errors
-    /// [`Halt::Device`].
-    pub async fn set_coil_current(&mut self, current_a: f64) -> Result<(), Halt> {
+    /// [`StopReason::Device`].
+    pub async fn set_coil_current(&mut self, current_a: f64) -> Result<(), StopReason> {
         let lease_s = self.profile.sequence.lease_s;
         let set = self.brake.set_current_a(current_a);
         let set = keep_lease(self.servo.as_mut(), &mut self.heard, lease_s, set).await;
@@ -396,7 +394,7 @@ impl Rig {
     }
 
     /// Brake to zero current, output off.
-    pub(super) async fn release_brake(&mut self) -> Result<(), Halt> {
+    pub(super) async fn release_brake(&mut self) -> Result<(), StopReason> {
         self.acquisition.borrow_mut().status.load_setpoint_nm = 0.0;
         let lease_s = self.profile.sequence.lease_s;
         let released = keep_lease(self.servo.as_mut(), &mut self.heard, lease_s, self.brake.release()).await;

@@ -1,4 +1,4 @@
-//! Stands where a servo or brake driver would, while there is none to speak to: says why to whatever is asked of it.
+//! In the place of a servo's or brake's driver while there is none to speak to: says why to whatever is asked of it.
 
 use std::time::Duration;
 
@@ -16,27 +16,27 @@ enum Reason {
 }
 
 /// Fails with its device's name and the reason.
-pub struct StandIn {
-    part: DeviceKind,
+pub struct LostDevice {
+    device: DeviceKind,
     reason: Reason,
     statistics: BusStatistics,
 }
 
-impl StandIn {
+impl LostDevice {
     /// In a lost device's place until it is back; `statistics` say what had happened on its line.
     #[must_use]
-    pub fn lost(part: DeviceKind, port: String, statistics: BusStatistics) -> Self {
-        Self { part, reason: Reason::Lost { port }, statistics }
+    pub fn hung_up(device: DeviceKind, port: String, statistics: BusStatistics) -> Self {
+        Self { device, reason: Reason::Lost { port }, statistics }
     }
 
     /// For a device whose register map is at fault, as `what` says.
     #[must_use]
-    pub fn unmapped(part: DeviceKind, what: String) -> Self {
-        Self { part, reason: Reason::Unmapped { what }, statistics: BusStatistics::default() }
+    pub fn unmapped(device: DeviceKind, what: String) -> Self {
+        Self { device, reason: Reason::Unmapped { what }, statistics: BusStatistics::default() }
     }
 
     fn refuse<T>(&self) -> Result<T, DeviceError> {
-        let device = self.part.name();
+        let device = self.device;
         Err(match &self.reason {
             Reason::Lost { port } => {
                 BusError::HungUp { device, port: port.clone(), reason: "not connected".into() }.into()
@@ -47,7 +47,7 @@ impl StandIn {
 }
 
 #[async_trait(?Send)]
-impl Servo for StandIn {
+impl Servo for LostDevice {
     async fn identify(&mut self) -> Result<Identity, DeviceError> {
         self.refuse()
     }
@@ -72,7 +72,7 @@ impl Servo for StandIn {
 }
 
 #[async_trait(?Send)]
-impl Brake for StandIn {
+impl Brake for LostDevice {
     async fn identify(&mut self) -> Result<Identity, DeviceError> {
         self.refuse()
     }
@@ -99,20 +99,20 @@ impl Brake for StandIn {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::halt::lost_part;
+    use crate::run::stop_reason::lost_device;
 
     #[tokio::test]
     async fn whatever_is_asked_is_answered_with_the_reason() {
-        let mut servo = StandIn::unmapped(DeviceKind::Servo, "no register 'speed_9'".into());
+        let mut servo = LostDevice::unmapped(DeviceKind::Servo, "no register 'speed_9'".into());
         let said = servo.set_motor_rpm(1.0).await.expect_err("refused");
-        assert_eq!(lost_part(&said), None, "waiting mends no map");
+        assert_eq!(lost_device(&said), None, "waiting mends no map");
         let said = said.to_string();
         assert!(said.contains("servo") && said.contains("speed_9"), "{said}");
 
         let line = BusStatistics { timeouts: 3, ..BusStatistics::default() };
-        let mut brake = StandIn::lost(DeviceKind::Brake, "/dev/ttyUSB7".into(), line);
+        let mut brake = LostDevice::hung_up(DeviceKind::Brake, "/dev/ttyUSB7".into(), line);
         let said = brake.set_current_a(1.0).await.expect_err("refused");
-        assert_eq!(lost_part(&said), Some(DeviceKind::Brake), "it may come back");
+        assert_eq!(lost_device(&said), Some(DeviceKind::Brake), "it may come back");
         assert!(said.to_string().contains("/dev/ttyUSB7"), "{said}");
         assert_eq!((Brake::statistics(&brake).timeouts, brake.max_current_a()), (3, 0.0));
     }

@@ -2,50 +2,22 @@
 
 use std::time::Duration;
 
-use async_trait::async_trait;
 use riglog::proto::{Level, Phase};
 use tokio::time::{Instant, sleep};
 
-use super::halt::Halt;
-use super::job::{Job, RunSpec};
-use super::limits::{KEY_HEAT, KEY_TEMPERATURE};
-use super::rig::Rig;
+use super::connected_rig::ConnectedRig;
+use super::job::Job;
+use super::observer::RunObserver;
+use super::panic::survive;
 use super::sequence;
-use super::session::survive;
+use super::stop_reason::StopReason;
 use super::supervisor::Event;
 
 /// A run that was begun so often without an end is given up.
 const MOST_ATTEMPTS: u32 = 5;
 
-/// DeviceKind of the heat account that has to be free before a run that spent it goes on.
+/// Part of the heat account that has to be free before a run that spent it goes on.
 const COOLED: f64 = 0.25;
-
-/// Looks on, run by run: a campaign opens a log for each and keeps its journal; a single run needs nothing.
-#[async_trait(?Send)]
-pub trait Attendant {
-    /// A run begins, from its first revolution.
-    async fn begins(&mut self, rig: &mut Rig, index: usize, run: &RunSpec) -> Result<(), Halt>;
-    /// A run is complete.
-    async fn ended(&mut self, rig: &mut Rig, index: usize, run: &RunSpec) -> Result<(), Halt>;
-    /// The rig was switched off in the middle of the job; `goes_on` where the policy has a remedy.
-    async fn interrupted(&mut self, rig: &mut Rig, halt: &Halt, goes_on: bool) -> Result<(), Halt>;
-}
-
-/// Needs nothing.
-pub struct Nobody;
-
-#[async_trait(?Send)]
-impl Attendant for Nobody {
-    async fn begins(&mut self, _: &mut Rig, _: usize, _: &RunSpec) -> Result<(), Halt> {
-        Ok(())
-    }
-    async fn ended(&mut self, _: &mut Rig, _: usize, _: &RunSpec) -> Result<(), Halt> {
-        Ok(())
-    }
-    async fn interrupted(&mut self, _: &mut Rig, _: &Halt, _: bool) -> Result<(), Halt> {
-        Ok(())
-    }
-}
 
 /// When a job goes on after it was interrupted.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -77,13 +49,13 @@ enum Remedy {
 }
 
 impl Policy {
-    fn remedy(&self, halt: &Halt) -> Option<Remedy> {
-        match halt {
-            Halt::Paused => Some(Remedy::AwaitOperator),
-            Halt::Limit { key, .. } if [KEY_TEMPERATURE, KEY_HEAT].contains(key) => self.suspend.map(Remedy::Cool),
-            Halt::EmergencyStop { .. } => self.suspend.map(Remedy::Release),
+    fn remedy(&self, reason: &StopReason) -> Option<Remedy> {
+        match reason {
+            StopReason::Paused => Some(Remedy::AwaitOperator),
+            StopReason::Limit(exceeded) if exceeded.limit.is_remedied_by_cooling() => self.suspend.map(Remedy::Cool),
+            StopReason::EmergencyStop { .. } => self.suspend.map(Remedy::Release),
             // It may be back already: a servo is called while the brake holds.
-            _ if halt.lost_part().is_some() && self.reconnect_s > 0.0 => {
+            _ if reason.lost_device().is_some() && self.reconnect_s > 0.0 => {
                 Some(Remedy::Reconnect { patience_s: self.reconnect_s })
             }
             _ => None,
@@ -93,42 +65,42 @@ impl Policy {
 
 /// Runs the job to its end or to a halt that the policy has no remedy for. The rig is off afterwards. Also what went wrong while
 /// switching off.
-pub async fn attend(
-    rig: &mut Rig,
+pub async fn run_job(
+    rig: &mut ConnectedRig,
     job: &mut Job,
     policy: Policy,
-    attendant: &mut dyn Attendant,
-) -> (Option<Halt>, Vec<String>) {
+    observer: &mut dyn RunObserver,
+) -> (Option<StopReason>, Vec<String>) {
     let mut troubles = Vec::new();
     loop {
-        let halt = survive(sequence::execute(rig, job, attendant)).await.err();
-        let halt = match halt {
-            Some(halt) => Some(recognise(rig, halt).await),
+        let reason = survive(sequence::execute(rig, job, observer)).await.err();
+        let reason = match reason {
+            Some(reason) => Some(recognise(rig, reason).await),
             None => None,
         };
-        let Some(halt) = halt else {
+        let Some(reason) = reason else {
             troubles.extend(rig.switch_off(Event::Finished).await);
             return (None, troubles);
         };
-        let level = if matches!(halt, Halt::Paused) { Level::Info } else { Level::Error };
-        rig.acquisition.borrow().event(level, "halt", halt.to_string());
-        troubles.extend(rig.switch_off(halt.event()).await);
-        let attempts = if matches!(halt, Halt::Paused) { 0 } else { job.begin_again() };
-        let remedy = policy.remedy(&halt).filter(|_| !rig.stop.any());
-        if let Err(failure) = attendant.interrupted(rig, &halt, remedy.is_some()).await {
+        let level = if matches!(reason, StopReason::Paused) { Level::Info } else { Level::Error };
+        rig.acquisition.borrow().event(level, "halt", reason.to_string());
+        troubles.extend(rig.switch_off(reason.event()).await);
+        let attempts = if matches!(reason, StopReason::Paused) { 0 } else { job.begin_again() };
+        let remedy = policy.remedy(&reason).filter(|_| !rig.stop.any());
+        if let Err(failure) = observer.interrupted(rig, &reason, remedy.is_some()).await {
             return (Some(failure), troubles);
         }
-        let Some(remedy) = remedy else { return (Some(halt), troubles) };
+        let Some(remedy) = remedy else { return (Some(reason), troubles) };
         if attempts >= MOST_ATTEMPTS {
             let run = job.current().map_or(0, |(index, _)| index + 1);
-            return (Some(Halt::Flapping { run, attempts, last: halt.to_string() }), troubles);
+            return (Some(StopReason::Flapping { run, attempts, last: reason.to_string() }), troubles);
         }
-        if !matches!(halt, Halt::Paused) {
-            tracing::warn!("suspended: {halt}");
+        if !matches!(reason, StopReason::Paused) {
+            tracing::warn!("suspended: {reason}");
         }
         let waited = Instant::now();
-        if let Err(halt) = wait_through(rig, policy, remedy).await {
-            return (Some(halt), troubles);
+        if let Err(reason) = wait_through(rig, policy, remedy).await {
+            return (Some(reason), troubles);
         }
         // What went wrong with switching off is in the log, and remedied.
         for trouble in troubles.drain(..) {
@@ -140,22 +112,22 @@ pub async fn attend(
 }
 
 /// An emergency stop that is pressed while the servo is being prepared shows as an alarm, or as a servo that does not come on.
-async fn recognise(rig: &mut Rig, halt: Halt) -> Halt {
+async fn recognise(rig: &mut ConnectedRig, reason: StopReason) -> StopReason {
     use crate::device::DeviceError::{Alarm, NotReached};
-    if !matches!(halt, Halt::Device(Alarm { .. } | NotReached { .. })) {
-        return halt;
+    if !matches!(reason, StopReason::Device(Alarm { .. } | NotReached { .. })) {
+        return reason;
     }
     match rig.servo.status().await {
-        Ok(status) if rig.servo.is_emergency_stop(status.alarm) => Halt::EmergencyStop { alarm: status.alarm },
-        _ => halt,
+        Ok(status) if rig.servo.is_emergency_stop(status.alarm) => StopReason::EmergencyStop { alarm: status.alarm },
+        _ => reason,
     }
 }
 
 /// Waits for a remedy; a device that is lost meanwhile is waited for first, and then the remedy goes on.
-async fn wait_through(rig: &mut Rig, policy: Policy, remedy: Remedy) -> Result<(), Halt> {
+async fn wait_through(rig: &mut ConnectedRig, policy: Policy, remedy: Remedy) -> Result<(), StopReason> {
     loop {
         let waited = wait(rig, remedy).await;
-        let lost = waited.as_ref().is_err_and(|halt| halt.lost_part().is_some()) && rig.has_lost_devices();
+        let lost = waited.as_ref().is_err_and(|reason| reason.lost_device().is_some()) && rig.has_lost_devices();
         if !lost || policy.reconnect_s == 0.0 || matches!(remedy, Remedy::Reconnect { .. }) {
             return waited;
         }
@@ -164,7 +136,7 @@ async fn wait_through(rig: &mut Rig, policy: Policy, remedy: Remedy) -> Result<(
 }
 
 /// Waits until the remedy has worked; the rig is off, its devices are asked, the log goes on.
-async fn wait(rig: &mut Rig, remedy: Remedy) -> Result<(), Halt> {
+async fn wait(rig: &mut ConnectedRig, remedy: Remedy) -> Result<(), StopReason> {
     match remedy {
         Remedy::Reconnect { patience_s } => rig.reconnect(patience_s).await,
         Remedy::AwaitOperator => {
@@ -173,14 +145,14 @@ async fn wait(rig: &mut Rig, remedy: Remedy) -> Result<(), Halt> {
             Ok(())
         }
         Remedy::Cool(suspend) => {
-            let cool = |rig: &Rig| {
+            let cool = |rig: &ConnectedRig| {
                 let temperature_c = rig.acquisition.borrow().status.brake_temperature_c;
                 temperature_c <= suspend.cool_to_c && rig.heat.fraction(&rig.profile.limits) <= COOLED
             };
             watch(rig, "the brake's cooling", suspend.patience_s, cool).await
         }
         Remedy::Release(suspend) => {
-            let released = |rig: &Rig| {
+            let released = |rig: &ConnectedRig| {
                 let alarm = rig.acquisition.borrow().status.servo_alarm;
                 !rig.servo.is_emergency_stop(alarm)
             };
@@ -198,10 +170,10 @@ async fn wait(rig: &mut Rig, remedy: Remedy) -> Result<(), Halt> {
 }
 
 /// Until the operator takes the pause back, in the operator's time even where the rig's runs faster.
-async fn await_operator(rig: &mut Rig) -> Result<(), Halt> {
+async fn await_operator(rig: &mut ConnectedRig) -> Result<(), StopReason> {
     rig.progress.note("paused: p or SIGUSR1 goes on, Ctrl-C ends");
     while rig.stop.paused() {
-        rig.heed_stop()?;
+        rig.check_stop()?;
         rig.log_works()?;
         if rig.clock.is_simulated() {
             let nap = tokio::task::spawn_blocking(|| std::thread::sleep(Duration::from_millis(50)));
@@ -215,11 +187,16 @@ async fn await_operator(rig: &mut Rig) -> Result<(), Halt> {
     Ok(())
 }
 
-async fn watch(rig: &mut Rig, what: &'static str, patience_s: f64, done: impl Fn(&Rig) -> bool) -> Result<(), Halt> {
+async fn watch(
+    rig: &mut ConnectedRig,
+    what: &'static str,
+    patience_s: f64,
+    done: impl Fn(&ConnectedRig) -> bool,
+) -> Result<(), StopReason> {
     rig.enter(Phase::Fault);
     let began = Instant::now();
     loop {
-        rig.heed_stop()?;
+        rig.check_stop()?;
         rig.log_works()?;
         sleep(rig.profile.poll_period()).await;
         look(rig).await?;
@@ -230,15 +207,15 @@ async fn watch(rig: &mut Rig, what: &'static str, patience_s: f64, done: impl Fn
         if began.elapsed().as_secs_f64() > patience_s {
             let rig = rig.acquisition.borrow();
             let now = format!("{:.1} °C, servo alarm {:#06x}", rig.status.brake_temperature_c, rig.status.servo_alarm);
-            return Err(Halt::TooLong { what, seconds: patience_s, now });
+            return Err(StopReason::TooLong { what, seconds: patience_s, now });
         }
     }
 }
 
 /// A look at devices of a rig that is off: alarms are expected, a device that is lost is not.
-async fn look(rig: &mut Rig) -> Result<(), Halt> {
+async fn look(rig: &mut ConnectedRig) -> Result<(), StopReason> {
     match rig.observe().await {
-        Err(halt) if halt.lost_part().is_some() => Err(halt),
+        Err(reason) if reason.lost_device().is_some() => Err(reason),
         _ => rig.encoders_live(),
     }
 }
