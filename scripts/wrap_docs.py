@@ -3,8 +3,8 @@
 
 Paragraphs and list items are filled anew; headings, tables, code, HTML and quotations stay as they are. What is rendered
 does not change: code spans are never broken, and no line begins with what would be taken for markup there. Without FILE
-it takes every document of the repository, fixtures left out. --check writes nothing, and exits with 1
-where a document is not as it would be written.
+it takes every document of the repository, fixtures left out. --check writes nothing, and exits with 1 where a document
+is not as it would be written.
 """
 
 import os
