@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Kind, RESOLUTION, SIMULATED, Setting};
+use super::setting::{Kind, RESOLUTION, SIMULATED, Setting};
 
 settings! {
     /// Columns of the candidates.

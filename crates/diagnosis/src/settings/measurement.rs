@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::{Kind, RESOLUTION, SIMULATED, Setting};
+use super::setting::{Kind, RESOLUTION, SIMULATED, Setting};
 
 settings! {
     /// Samples → points → runs.
