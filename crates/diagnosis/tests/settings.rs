@@ -13,8 +13,8 @@ const UPDATE: &str = "UPDATE_SETTINGS";
 fn page() -> String {
     let mut page = String::from(
         "# Settings of the diagnosis\n\n\
-         Every number that can change a verdict, by step, as `crates/diagnosis/src/settings.rs` has it; a diagnosis carries those that it was\n\
-         made with in its field `settings`. What *derived*, *resolution* and *calibrated* mean stands there. Made by\n\
+         Every number that can change a verdict, by step, as `crates/diagnosis/src/settings.rs` has it; a diagnosis carries those\n\
+         that it was made with in its field `settings`. What *derived*, *resolution* and *calibrated* mean stands there. Made by\n\
          `UPDATE_SETTINGS=1 cargo test -p diagnosis --test settings`; do not edit.\n",
     );
     for (step, about, settings) in Settings::TABLE {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! score = log evidence + Σ log prior,   prior odds 0.04 an effect, 0.15 all patterns together,
-//! w_m ∝ exp(0.85 (score_m − best)),     p(effect) = Σ of the weights of the sets that contain it
+//! w_m ∝ exp(score_m − best),     p(effect) = Σ of the weights of the sets that contain it
 //! ```
 
 use gearmodel::effect::{LIBRARY, NominalRig};
@@ -21,7 +21,7 @@ use crate::settings::Settings;
 use gearmodel::Direction::{Ccw, Cw};
 
 /// The exponent of the weights.
-const SHARPNESS: f64 = 0.85;
+const SHARPNESS: f64 = 1.0;
 /// What a search does not look at lies further below the best, nats: by what a scan expects of it.
 const COMPETING_NATS: f64 = 9.0;
 

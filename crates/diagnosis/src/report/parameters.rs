@@ -1,6 +1,6 @@
 //! Parameters as the contract writes them: names, values, standard deviations and units as JSON.
 
-use gearmodel::effect::{LIBRARY, Parameter, Value};
+use gearmodel::effect::{LIBRARY, Parameter, ParameterKind, Value};
 use serde_json::{Map, Value as Json, json};
 
 use super::context::Context;
@@ -28,8 +28,8 @@ fn entry(parameter: &Parameter, settings: &ReportSettings) -> Json {
     let std = match (&parameter.value, parameter.std) {
         (Value::Number(x), Some(std)) => {
             // A phase has no size of its own.
-            let inexact =
-                if parameter.name.starts_with("ph") { settings.linearised } else { settings.linearised * x.abs() };
+            let phase = parameter.kind == ParameterKind::Phase;
+            let inexact = if phase { settings.linearised } else { settings.linearised * x.abs() };
             Some(if std > 0.0 { (settings.wider * std).hypot(inexact) } else { std })
         }
         (_, std) => std,

@@ -1,7 +1,7 @@
 //! Plain words for the rig's people: what an effect is called, what to do about it, and what a signature says.
 
 use crate::diagnosis::{Diagnosis, Verdict};
-use gearmodel::effect::{Accumulates, Carrier, Parity, Signature, by_name};
+use gearmodel::effect::{Accumulates, Carrier, Parity, SharedTrace, Signature, by_name};
 
 /// An effect in plain words; a name outside the library stays as it is.
 #[must_use]
@@ -48,11 +48,10 @@ pub fn item(verdict: &Verdict) -> String {
 /// Why a group's members look alike.
 #[must_use]
 pub fn same_trace(members: &[String], elliptic: bool) -> &'static str {
-    let all = |names: &[&str]| members.iter().all(|m| names.contains(&m.as_str()));
-    let shafts = ["encoder1_eccentricity", "encoder2_eccentricity", "phasing_error", "pitch_curve_error"];
-    if elliptic && all(&shafts) {
+    let all = |trace| members.iter().all(|m| by_name(m).is_some_and(|effect| effect.shared_trace() == Some(trace)));
+    if elliptic && all(SharedTrace::TurnOfAnEllipse) {
         "one set-up cannot tell which: same trace for an elliptic pair"
-    } else if all(&["backlash_error", "bearing_clearance"]) {
+    } else if all(SharedTrace::Play) {
         "running cannot tell which: same trace for every pair"
     } else {
         "this data cannot tell which: same trace under this plan"

@@ -2,7 +2,8 @@
 //! TE = −dir·(dj/2) cos α/A.
 
 use super::{
-    Carrier, Effect, Estimate, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature, Words,
+    Carrier, Effect, Estimate, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, SharedTrace, Signature,
+    Words,
 };
 
 /// Tooth thinning differs from the designed backlash by dj along the pitch curve.
@@ -22,6 +23,10 @@ impl Effect for BacklashError {
             "backlash off its documented value",
             "check tooth thickness with a feeler or over pins and correct backlash_mm in pair.toml",
         )
+    }
+
+    fn shared_trace(&self) -> Option<SharedTrace> {
+        Some(SharedTrace::Play)
     }
 
     fn signature(&self) -> Signature {

@@ -2,7 +2,8 @@
 //! The same trace as a backlash error of 2c/cos α.
 
 use super::{
-    Carrier, Effect, Estimate, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature, Words,
+    Carrier, Effect, Estimate, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, SharedTrace, Signature,
+    Words,
 };
 
 /// Bearings with play.
@@ -19,6 +20,10 @@ impl Effect for BearingClearance {
 
     fn words(&self) -> Words {
         Words::new("clearance in the bearings", "preload or replace the bearings")
+    }
+
+    fn shared_trace(&self) -> Option<SharedTrace> {
+        Some(SharedTrace::Play)
     }
 
     fn signature(&self) -> Signature {

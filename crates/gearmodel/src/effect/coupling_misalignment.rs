@@ -55,7 +55,7 @@ impl Effect for CouplingMisalignment {
         let root = polar.amplitude.sqrt().max(f64::MIN_POSITIVE);
         vec![
             Parameter::number("beta_rad", 2.0 * root, polar.amplitude_std / root, "rad"),
-            Parameter::number("phase_rad", polar.phase_rad, polar.phase_std_rad, "rad"),
+            Parameter::phase("phase_rad", polar.phase_rad, polar.phase_std_rad),
         ]
     }
 

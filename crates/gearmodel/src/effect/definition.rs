@@ -3,7 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::{
-    Estimate, Grain, HandTest, MeasurementPlan, NominalRig, OperatingPoint, Parameter, Shaft, Signature, Words,
+    Estimate, Grain, HandTest, MeasurementPlan, NominalRig, OperatingPoint, Parameter, Shaft, SharedTrace, Signature,
+    Words,
 };
 use crate::stated::{Given, StatedEffect, StatedError};
 
@@ -34,6 +35,11 @@ pub trait Effect: Sync {
 
     /// What it is called at the rig, and what to do about it.
     fn words(&self) -> Words;
+
+    /// The trace that it shares with others, whatever is run.
+    fn shared_trace(&self) -> Option<SharedTrace> {
+        None
+    }
 
     /// How it shows.
     fn signature(&self) -> Signature;

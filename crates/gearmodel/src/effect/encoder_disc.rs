@@ -3,8 +3,8 @@
 //! encoder.
 
 use super::{
-    Effect, Estimate, Given, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shaft, Shape, Signature,
-    StatedError, Words,
+    Effect, Estimate, Given, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shaft, Shape, SharedTrace,
+    Signature, StatedError, Words,
 };
 
 /// Order 1 or 2 of the input or output encoder's disc.
@@ -14,7 +14,7 @@ pub(super) struct EncoderDisc {
 }
 
 /// What is wrong with the disc.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) enum Order {
     Eccentricity = 1,
     Ellipticity = 2,
@@ -60,6 +60,10 @@ impl Effect for EncoderDisc {
             )
             .of_family("encoder ellipticity, input or output"),
         }
+    }
+
+    fn shared_trace(&self) -> Option<SharedTrace> {
+        (self.order == Order::Eccentricity).then_some(SharedTrace::TurnOfAnEllipse)
     }
 
     fn signature(&self) -> Signature {

@@ -62,7 +62,7 @@ pub use parameter::{Parameter, ParameterKind, Value};
 pub use polar::Estimate;
 pub use shaft::Shaft;
 pub use signature::{Accumulates, Carrier, Parity, Signature};
-pub use words::Words;
+pub use words::{SharedTrace, Words};
 
 use encoder_disc::{EncoderDisc, Order};
 

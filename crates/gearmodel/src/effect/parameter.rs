@@ -18,6 +18,8 @@ pub enum Value {
 pub enum ParameterKind {
     /// An amplitude of the fit, or what follows from amplitudes; a number has a standard deviation.
     Fitted,
+    /// An angle of the fit: it has no size of its own, and its standard deviation is one of a turn.
+    Phase,
     /// Of the shape that the search found best.
     Searched,
     /// Follows from the other parameters or from what is documented.
@@ -44,6 +46,12 @@ impl Parameter {
     #[must_use]
     pub fn number(name: &'static str, value: f64, std: f64, unit: &'static str) -> Self {
         Self { name, value: Value::Number(value), std: Some(std), unit, kind: ParameterKind::Fitted }
+    }
+
+    /// A fitted phase, rad, with its standard deviation.
+    #[must_use]
+    pub fn phase(name: &'static str, value_rad: f64, std_rad: f64) -> Self {
+        Self { kind: ParameterKind::Phase, ..Self::number(name, value_rad, std_rad, "rad") }
     }
 
     /// Fitted numbers, one a tooth.

@@ -1,7 +1,8 @@
 //! Gear 1 is clocked by δ against its encoder's index: it stands at θ1 + δ, TE = f(θ1 + δ) − f(θ1) = i δ.
 
 use super::{
-    Carrier, Effect, Estimate, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, Signature, Words,
+    Carrier, Effect, Estimate, HandTest, NominalRig, OperatingPoint, Parameter, Parity, Shape, SharedTrace, Signature,
+    Words,
 };
 
 /// Gear 1 is clocked by δ against its encoder's index.
@@ -21,6 +22,10 @@ impl Effect for PhasingError {
             "clocking of gear 1 against the index",
             "clock gear 1 to the encoder's index again, or enter the angle",
         )
+    }
+
+    fn shared_trace(&self) -> Option<SharedTrace> {
+        Some(SharedTrace::TurnOfAnEllipse)
     }
 
     fn signature(&self) -> Signature {

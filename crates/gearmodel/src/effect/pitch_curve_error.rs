@@ -4,7 +4,7 @@
 
 use super::{
     Accumulates, Carrier, Effect, Estimate, Given, HandTest, MeasurementPlan, NominalRig, OperatingPoint, Parameter,
-    Parity, Shape, Signature, Stated, StatedEffect, StatedError, Words,
+    Parity, Shape, SharedTrace, Signature, Stated, StatedEffect, StatedError, Words,
 };
 
 /// Error of the pitch curves' form or closure.
@@ -21,6 +21,10 @@ impl Effect for PitchCurveError {
 
     fn words(&self) -> Words {
         Words::new("pitch curve off its nominal k", "check the gear's programme: k as cut against k in pair.toml")
+    }
+
+    fn shared_trace(&self) -> Option<SharedTrace> {
+        Some(SharedTrace::TurnOfAnEllipse)
     }
 
     fn signature(&self) -> Signature {

@@ -60,7 +60,7 @@ impl Polar {
     pub fn parameters(&self, amplitude: &'static str, unit: &'static str) -> Vec<Parameter> {
         vec![
             Parameter::number(amplitude, self.amplitude, self.amplitude_std, unit),
-            Parameter::number("phase_rad", self.phase_rad, self.phase_std_rad, "rad"),
+            Parameter::phase("phase_rad", self.phase_rad, self.phase_std_rad),
         ]
     }
 }

@@ -91,7 +91,7 @@ impl Effect for ProfileError {
                 let polar = found.polar(2 * h);
                 [
                     Parameter::number(NAMES[h][0], polar.amplitude, polar.amplitude_std, "mm"),
-                    Parameter::number(NAMES[h][1], polar.phase_rad, polar.phase_std_rad, "rad"),
+                    Parameter::phase(NAMES[h][1], polar.phase_rad, polar.phase_std_rad),
                 ]
             })
             .collect()

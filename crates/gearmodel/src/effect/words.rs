@@ -11,6 +11,15 @@ pub struct Words {
     pub family: Option<&'static str>,
 }
 
+/// What leaves one and the same trace, so that no run can tell it from another of its kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SharedTrace {
+    /// Play of teeth or bearings: the same on every pair.
+    Play,
+    /// Once a turn of either encoder, of the clocking and of k: the same on an elliptic pair.
+    TurnOfAnEllipse,
+}
+
 impl Words {
     /// Words of an effect without such a sibling.
     #[must_use]

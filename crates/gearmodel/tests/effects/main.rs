@@ -138,8 +138,8 @@ fn every_trace_is_finite_on_every_kind_of_pair() {
                 let parameters = effect.parameters(&rig, &shape, &found);
                 assert!(!parameters.is_empty());
                 for parameter in parameters {
-                    let fitted_number =
-                        parameter.kind == ParameterKind::Fitted && matches!(parameter.value, Value::Number(_));
+                    let fitted = matches!(parameter.kind, ParameterKind::Fitted | ParameterKind::Phase);
+                    let fitted_number = fitted && matches!(parameter.value, Value::Number(_));
                     assert_eq!(parameter.std.is_some(), fitted_number, "{} of {}", parameter.name, effect.name());
                 }
             }
