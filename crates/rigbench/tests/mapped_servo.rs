@@ -8,7 +8,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use rigbench::bus_stress::{Device, Servo as EmulatedDrive, Workload, serve};
-use rigd::device::mapped_servo::open;
+use rigd::device::drivers::mapped_servo::open;
 use rigd::device::{DeviceError, DeviceKind, Servo};
 use rigd::link::Address;
 use rigd::profile::{Profile, ServoProfile};

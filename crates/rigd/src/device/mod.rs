@@ -1,15 +1,9 @@
-//! Devices by what they do. One device is one file and one line in its list, [`drivers`].
+//! Devices by what they do. One device is one file in [`drivers`] and one line in its list.
 
 pub mod bus;
-pub mod counter_box;
 pub mod drivers;
-pub mod dsp7000;
 pub mod lost_device;
 pub mod map;
-pub mod mapped_brake;
-pub mod mapped_servo;
-pub mod qsb;
-pub mod qsb_reader;
 pub mod refused;
 pub mod two_clocks;
 

@@ -10,8 +10,8 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::time::{Instant, timeout, timeout_at};
 use wire::dsp7000::{Command, Dsp7000Error, FULL_SCALE_A, MAX_PERCENT, Reading, Status};
 
-use super::bus::BusStatistics;
-use super::{Brake, BrakeStatus, DeviceError, DeviceKind, Identity};
+use crate::device::bus::BusStatistics;
+use crate::device::{Brake, BrakeStatus, DeviceError, DeviceKind, Identity};
 use crate::link::{Address, Link};
 use crate::profile::BrakeProfile;
 

@@ -1,8 +1,14 @@
-//! The drivers that there are, by their names in the profile.
+//! The drivers that there are, by their names in the profile: one driver is one file here and a line in its list.
+
+mod counter_box;
+mod dsp7000;
+mod mapped_brake;
+pub mod mapped_servo;
+mod qsb;
 
 use thiserror::Error;
 
-use super::{Brake, Counter, DeviceKind, Servo, counter_box, dsp7000, map, mapped_brake, mapped_servo, qsb};
+use super::{Brake, Counter, DeviceKind, Servo, map};
 use crate::link::{Address, Link};
 use crate::profile::{BrakeProfile, CounterProfile, ServoProfile};
 

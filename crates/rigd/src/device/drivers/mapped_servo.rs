@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 
-use super::bus::{BusError, BusStatistics};
-use super::lost_device::LostDevice;
-use super::map::{Map, Mapped, ServoRules, Step};
-use super::{DeviceError, DeviceKind, Identity, Servo, ServoStatus};
+use crate::device::bus::{BusError, BusStatistics};
+use crate::device::lost_device::LostDevice;
+use crate::device::map::{Map, Mapped, ServoRules, Step};
+use crate::device::{DeviceError, DeviceKind, Identity, Servo, ServoStatus};
 use crate::link::{Address, Link};
 use crate::profile::ServoProfile;
 

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use wire::qsb::register::COUNT;
 use wire::qsb::{Answer, Kind, Unwrap};
 
-use super::two_clocks::{ClockError, ClockFit};
+use crate::device::two_clocks::{ClockError, ClockFit};
 
 /// A reader's time step, s: its stamp counts 1/512 s (US Digital's QSB demonstration program: "every 1.95 milliseconds").
 pub const TICK_S: f64 = 1.0 / 512.0;

@@ -9,7 +9,7 @@ use tokio::time::{Instant, timeout_at};
 use wire::Samples;
 use wire::counter_box::{AckStatus, Command, Encoder, Frame, MAX_SAMPLES_PER_FRAME, PROTOCOL_VERSION, StreamDecoder};
 
-use super::{Counter, CounterIdentity, DeviceError, DeviceKind, Zero};
+use crate::device::{Counter, CounterIdentity, DeviceError, DeviceKind, Zero};
 use crate::link::{Address, Link};
 use crate::profile::CounterProfile;
 

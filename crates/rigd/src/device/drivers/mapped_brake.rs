@@ -2,10 +2,10 @@
 
 use async_trait::async_trait;
 
-use super::bus::BusStatistics;
-use super::lost_device::LostDevice;
-use super::map::{BrakeRules, Map, Mapped};
-use super::{Brake, BrakeStatus, DeviceError, DeviceKind, Identity};
+use crate::device::bus::BusStatistics;
+use crate::device::lost_device::LostDevice;
+use crate::device::map::{BrakeRules, Map, Mapped};
+use crate::device::{Brake, BrakeStatus, DeviceError, DeviceKind, Identity};
 use crate::link::{Address, Link};
 use crate::profile::BrakeProfile;
 

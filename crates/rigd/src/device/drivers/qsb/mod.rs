@@ -1,7 +1,9 @@
 //! Two US Digital QSB readers as one counter: their streams are put on the input reader's clock. Lines: `wire::qsb`, docs/wire/qsb.md.
 //!
 //! A sample is a line of the input reader. The output is interpolated between its reader's lines on both sides of that instant, which
-//! [`two_clocks`](super::two_clocks) finds by both clocks' fits to the host's; the fits are kept up while the readers stream.
+//! [`two_clocks`](crate::device::two_clocks) finds by both clocks' fits to the host's; the fits are kept up while the readers stream.
+
+mod reader;
 
 use std::time::Duration;
 
@@ -11,12 +13,12 @@ use tokio::time::{Instant, timeout_at};
 use wire::Samples;
 use wire::qsb::{Answer, END_CR, END_LF, END_TIME, Instruction, Kind, register};
 
-use super::qsb_reader::{Jumped, Reader, TICK_NS, TICK_S};
-use super::two_clocks::{ClockFit, Skew};
-use super::{Clocks, Counter, CounterIdentity, DeviceError, DeviceKind, Zero};
+use crate::device::two_clocks::{ClockFit, Skew};
+use crate::device::{Clocks, Counter, CounterIdentity, DeviceError, DeviceKind, Zero};
 use crate::link::{Address, Link};
 pub use crate::profile::qsb::DRIVER;
 use crate::profile::{CounterProfile, QsbProfile};
+use reader::{Jumped, Reader, TICK_NS, TICK_S};
 
 /// How long a reader may take to answer.
 const PATIENCE: Duration = Duration::from_millis(300);
